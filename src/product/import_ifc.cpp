@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <map>
@@ -17,6 +18,7 @@
 #include "product/import.h"
 #include "product/plan_limits.h"
 #include "product/reading.h"
+#include "product/support.h"
 
 namespace topple::product {
 
@@ -62,6 +64,17 @@ int nearest(const std::vector<double>& lines, double value) {
 std::string letters(int i) {
   std::string out;
   for (int n = i; n >= 0; n = n / 26 - 1) out.insert(out.begin(), static_cast<char>('A' + n % 26));
+  return out;
+}
+/// Rows and frames of the points of a place, "A1" or "A1B2".
+std::vector<std::array<int, 2>> points_of(const std::string& place) {
+  std::vector<std::array<int, 2>> out;
+  for (size_t at = 0; at < place.size();) {
+    int row = 0, frame = 0;
+    for (; at < place.size() && place[at] >= 'A'; ++at) row = 26 * row + (place[at] - 'A') + 1;
+    for (; at < place.size() && place[at] < 'A'; ++at) frame = 10 * frame + (place[at] - '0');
+    out.push_back({row - 1, frame - 1});
+  }
   return out;
 }
 std::string metres(double x) { return fmt::format("\"{:.3f} m\"", std::abs(x) < 5e-4 ? 0.0 : x); }
@@ -137,9 +150,10 @@ class Planner {
     gather();
     find_grid();
     place_columns();
-    place_beams();
+    const Claims walls = claim_walls();
+    place_beams(walls);
     place_slabs();
-    place_walls();
+    place_walls(walls);
     count_rest();
     if (const auto meshes = std::count_if(b_.elements.begin(), b_.elements.end(),
                                           [](const IfcElement& e) { return e.is_mesh && e.has_box; });
@@ -423,22 +437,69 @@ class Planner {
     return out;
   }
 
-  void place_beams() {
-    Claims claims;
+  /// Columns, walls and these beams by their places, for what carries what.
+  std::vector<Draft> make_drafts(const Claims& walls, const std::set<std::pair<int, std::string>>& beams) const {
+    std::vector<Draft> drafts;
+    const auto add = [&drafts](MemberKind kind, int storey, const std::string& place) {
+      const auto points = points_of(place);
+      Member m;
+      m.kind = kind, m.storey = storey;
+      m.row_a = points.front()[0], m.frame_a = points.front()[1];
+      m.row_b = points.back()[0], m.frame_b = points.back()[1];
+      drafts.push_back({m, {}, {}, {}});
+    };
+    for (const auto& [s, place] : beams) add(MemberKind::Beam, s, place);  // first: their indices are those of the set
+    for (const Group& g : columns_)
+      for (const auto& [s, places] : g.places)
+        for (const std::string& place : places) add(MemberKind::Column, s, place);
+    for (const auto& [where, claim] : walls.at) add(MemberKind::Wall, where.first, where.second);
+    return drafts;
+  }
+  /// Takes those away that hang in the air, and what they carried.
+  void keep_carried(std::set<std::pair<int, std::string>>& beams, const Claims& walls) const {
+    for (;;) {
+      const std::vector<size_t> hanging = find_hanging_beams(make_drafts(walls, beams));
+      if (hanging.empty()) return;
+      const std::vector<std::pair<int, std::string>> list(beams.begin(), beams.end());
+      for (const size_t i : hanging) beams.erase(list[i]);
+    }
+  }
+
+  void place_beams(const Claims& walls) {
+    struct Run {
+      const IfcElement* element = nullptr;
+      int storey = 0;
+      std::vector<std::string> edges;
+    };
+    std::vector<Run> runs;
+    std::set<std::pair<int, std::string>> carried;
     for (const IfcElement* e : fit_["IFCBEAM"]) {
-      const double width = std::min(e->high.x - e->low.x, e->high.y - e->low.y), height = e->high.z - e->low.z;
       const int s = storey_below(e->high.z);
       const auto edges = edges_of(*e);
       if (s < 0) {
         left_out(*e, "its top is not level with a floor");
-      } else if (height >= storey_height(s)) {
+      } else if (e->high.z - e->low.z >= storey_height(s)) {
         left_out(*e, "is as deep as its storey is high");
       } else if (edges.empty()) {
         left_out(*e, "does not run between columns of the grid");
       } else {
-        claims.all.push_back({e, group_of(beams_, *e, width, height), width * height});
-        for (const std::string& edge : edges) claims.add(claims.all.back(), s, edge);
+        runs.push_back({e, s, edges});
+        for (const std::string& edge : edges) carried.emplace(s, edge);
       }
+    }
+    keep_carried(carried, walls);
+    Claims claims;
+    for (Run& run : runs) {
+      const IfcElement& e = *run.element;
+      const auto hanging = std::erase_if(run.edges, [&](const std::string& edge) {
+        return carried.count({run.storey, edge}) == 0;
+      });
+      const char* why = "hangs in the air: no column or wall stands below its end";
+      if (hanging > 0) left_out(e, run.edges.empty() ? why : std::string("a span of it ") + why);
+      if (run.edges.empty()) continue;
+      const double width = std::min(e.high.x - e.low.x, e.high.y - e.low.y), height = e.high.z - e.low.z;
+      claims.all.push_back({&e, group_of(beams_, e, width, height), width * height});
+      for (const std::string& edge : run.edges) claims.add(claims.all.back(), run.storey, edge);
     }
     const int placed = settle(beams_, claims, "beams", "larger");
     if (placed > 0) tell_placed(placed, "beam", beams_.size(), "section");
@@ -496,7 +557,7 @@ class Planner {
     }
   }
 
-  void place_walls() {
+  Claims claim_walls() {
     Claims claims;
     for (const IfcElement* e : fit_["IFCWALL"]) {
       const double thickness = std::min(e->high.x - e->low.x, e->high.y - e->low.y);
@@ -515,6 +576,9 @@ class Planner {
                                    : "reaches over less than half of every storey");
       }
     }
+    return claims;
+  }
+  void place_walls(const Claims& claims) {
     const int placed = settle(walls_, claims, "walls", "thicker");
     if (placed > 0) {
       tell_placed(placed, "wall", walls_.size(), "thickness");

@@ -73,6 +73,9 @@ int count_beams(const Carriers& c, const Node3& point) {
   return it == c.beam_ends.end() ? 0 : it->second;
 }
 
+/// It ends on other beams that are carried.
+bool ends_on_beams(const Carriers& c, const Node3& end) { return count_beams(c, end) > 1 && c.held.count(end); }
+
 bool has_slab_beside(const Carriers& c, const Edge& edge) {
   const auto [s, row_a, frame_a, row_b, frame_b] = edge;
   if (row_a == row_b)
@@ -133,6 +136,22 @@ void check_spans(const Plan& plan, const std::vector<Draft>& drafts, Complaints&
 
 }  // namespace
 
+std::vector<size_t> find_hanging_beams(const std::vector<Draft>& drafts) {
+  Carriers carriers = collect(drafts);
+  find_held(carriers);
+  std::vector<size_t> out;
+  for (size_t i = 0; i < drafts.size(); ++i) {
+    const Member& m = drafts[i].member;
+    if (m.kind != MemberKind::Beam) continue;
+    for (const Node3& end : {Node3{m.storey, m.row_a, m.frame_a}, Node3{m.storey, m.row_b, m.frame_b}})
+      if (!stands_below(carriers, end) && !ends_on_beams(carriers, end)) {
+        out.push_back(i);
+        break;
+      }
+  }
+  return out;
+}
+
 void check_support(const Plan& plan, const std::vector<Draft>& drafts, Complaints& complaints) {
   Carriers carriers = collect(drafts);
   find_held(carriers);
@@ -158,7 +177,7 @@ void check_support(const Plan& plan, const std::vector<Draft>& drafts, Complaint
       case MemberKind::Beam:
         for (const Node3& end : {a, b}) {
           if (stands_below(carriers, end)) continue;
-          if (count_beams(carriers, end) > 1 && carriers.held.count(end)) {
+          if (ends_on_beams(carriers, end)) {
             carried.add(draft, "ends at " + point_name(end) + " on other beams, with no column below", "");
           } else {
             hanging.add(draft, "hangs in the air at " + point_name(end) + ": no column or wall below its end",

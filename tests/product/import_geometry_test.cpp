@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "base/error.h"
@@ -334,6 +335,62 @@ TEST(ImportIfcStoreys, EndAtTheLastFloorNotAtParapetsOrBelowSlabs) {
   EXPECT_EQ(heights(5.8, {0, 3, 6}), "[\"3.000 m\", \"3.000 m\"]") << "the slab lies on the columns";
   EXPECT_EQ(heights(6, {0, 3}), "[\"3.000 m\", \"3.000 m\"]") << "no storey at the roof";
   EXPECT_EQ(heights(6, {0, 3, 3.4, 9}), "[\"3.000 m\", \"3.000 m\"]");
+}
+
+/// Beams of a frame of two storeys over the rows x = 0, 5 and 10 and the frames y = 0 and 6 without the column B2.
+Import import_beams(const std::vector<std::array<double, 5>>& beams, bool has_wall = false) {
+  Writer w;
+  w.metres();
+  for (const double z : {0.0, 3.0}) {
+    for (const double x : {0.0, 5.0, 10.0})
+      for (const double y : {0.0, 6.0})
+        if (x != 5 || y != 6) block(w, "IFCCOLUMN", w.placement("$", x, y, z), 0.3, 0.3, 3);
+    if (has_wall) block(w, "IFCWALL", w.placement("$", 7.5, 6, z), 5, 0.2, 3);
+  }
+  for (const auto& [x, y, z, along_x, along_y] : beams)
+    block(w, "IFCBEAM", w.placement("$", x, y, z - 0.5), along_x, along_y, 0.5);
+  return import("IFC4", w);
+}
+
+TEST(ImportIfcBeams, ThatHangInTheAirAreLeftOut) {
+  const auto at = [](const Import& made) {
+    const size_t rule = made.text.find("[[beams]]"), from = made.text.find("at = ", rule);
+    return rule == std::string::npos ? "" : made.text.substr(from + 5, made.text.find("\n", from) - from - 5);
+  };
+  const std::string why = " x BEAM: hangs in the air: no column or wall stands below its end";
+  const std::array<double, 5> a1a2{0, 3, 3, 0.3, 6}, b1b2{5, 3, 3, 0.3, 6}, a2b2{2.5, 6, 3, 5, 0.3},
+      b2c2{7.5, 6, 3, 5, 0.3}, b1b2_above{5, 3, 6, 0.3, 6}, a1c1{5, 0, 3, 10, 0.3}, a2c2{5, 6, 3, 10, 0.3};
+  const Import one = import_beams({a1a2, b1b2, b1b2_above});
+  EXPECT_EQ(at(one), "[\"A1A2\"]");
+  EXPECT_THAT(one.report.missing, Contains("2" + why));
+  EXPECT_THAT(one.report.taken, Contains("1 beam in 1 section"));
+  // on other beams that are carried, of one element or of several
+  EXPECT_EQ(at(import_beams({a2c2})), "[\"A2B2\", \"B2C2\"]");
+  const Import carried = import_beams({a2b2, b2c2, b1b2, a1c1});
+  EXPECT_EQ(at(carried), "[\"A1B1\", \"A2B2\", \"B1B2\", \"B1C1\", \"B2C2\"]");
+  EXPECT_THAT(carried.report.missing, Not(Contains(HasSubstr("BEAM"))));
+  // not on beams of another floor
+  EXPECT_THAT(import_beams({a2c2, b1b2_above}).report.missing, Contains("1" + why));
+  // on the end of a wall
+  EXPECT_EQ(at(import_beams({b1b2}, true)), "[\"B1B2\"]");
+  // none of two that share a place
+  EXPECT_THAT(import_beams({b1b2, b1b2}).report.missing, Contains("2" + why));
+  EXPECT_EQ(at(import_beams({b1b2, b1b2})), "");
+}
+
+TEST(ImportIfcBeams, LoseTheSpansThatHangInTheAir) {
+  // three spans along a row whose last column is missing
+  Writer w;
+  w.metres();
+  for (const double x : {0.0, 5.0, 10.0, 15.0})
+    for (const double y : {0.0, 6.0})
+      if (x != 15 || y != 6) block(w, "IFCCOLUMN", w.placement("$", x, y, 0), 0.3, 0.3, 3);
+  block(w, "IFCBEAM", w.placement("$", 7.5, 6, 2.5), 15, 0.3, 0.5);
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.text, HasSubstr("at = [\"A2B2\", \"B2C2\"]"));
+  EXPECT_THAT(made.report.taken, Contains("1 beam in 1 section"));
+  EXPECT_THAT(made.report.missing,
+              Contains("1 x BEAM: a span of it hangs in the air: no column or wall stands below its end"));
 }
 
 TEST(ImportIfcKinds, ThatAreNotTakenAreCounted) {
