@@ -126,6 +126,18 @@ std::vector<double> read_forces(const std::vector<std::string>& typed) {
   return out;
 }
 
+/// Each force once, in their order; those that differ by rounding alone are equal.
+std::vector<double> take_once(const std::vector<double>& forces) {
+  std::vector<double> out;
+  for (const double N : forces) {
+    const auto is_equal = [N](double other) {
+      return std::abs(N - other) <= 1e-9 * std::max(std::abs(N), std::abs(other));
+    };
+    if (std::none_of(out.begin(), out.end(), is_equal)) out.push_back(N);
+  }
+  return out;
+}
+
 /// A positive quantity of the command line; 0 if it was not given.
 double read_positive(const std::string& text, Dimension dimension, const char* option) {
   if (text.empty()) return 0;
@@ -345,6 +357,7 @@ int compute_rcc(const Arguments& a, const std::atomic<bool>& cancel) {
       for (const double N : choose_forces(rcc))
         if (std::abs(N - dead_load) > -apart) task.normal_forces.push_back(N);
     }
+    task.normal_forces = take_once(task.normal_forces);
     record::RccReport report = make_rcc_report(task.zone, rcc, task.normal_forces);
     report.title = task.title;
     report.source = a.input;

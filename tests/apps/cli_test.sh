@@ -581,6 +581,12 @@ rcc)
   is_json a/b/rcc.json; lacks a/b/rcc.html "http"; has a/b/rcc.html "Not modelled"
   expect 0 "$topple" rcc "$zone" --normal-force "3.7 MN" --normal-force 0 --json; is_json out; has err "residual"
   cmp out a/b/rcc.json || failures=$((failures + 1))
+  # equal forces count once
+  expect 0 "$topple" rcc "$zone" --normal-force "3.7 MN" --normal-force "3700 kN" --normal-force 0 --normal-force "-0 N" --normal-force "3700000.0001 N" -o equal
+  has out "+y -y +z -z"; lacks out "-y -y"
+  for f in points.csv curves.csv rcc.json; do cmp equal/$f a/b/$f || failures=$((failures + 1)); done
+  sed 's/^normal_force = .*//; s/^\[zone\]/&\nnormal_force = ["3.7 MN", "3700 kN", "0 N"]/' "$zone" >equal.toml
+  expect 0 "$topple" rcc equal.toml -o listed; cmp listed/points.csv a/b/points.csv || failures=$((failures + 1))
   expect 0 "$topple" rcc "$zone" --normal-force "20 MN"; has out "cannot be carried: strained evenly the section crushes at 8.91 MN"
   expect 0 "$topple" rcc "$zone" --normal-force "-9 MN"; has out "cannot be carried: strained evenly the section tears at 3.2 MN"
   expect 2 "$topple" rcc "$zone" --normal-force "3 apples"; has err "--normal-force"; has err "units: N, kN, MN"
