@@ -438,8 +438,10 @@ void add_study(CLI::App& app, Arguments& a) {
   study->add_option("--timeout", y.timeout, "time for one answer, such as \"60 s\" or 60 (seconds); none if left out")
       ->type_name("QUANTITY");
   study->add_flag("--one-shot", y.one_shot, "start the command for every point and close its input behind it");
-  study->add_option("--store", y.store, "database on a server, postgresql://user@host/name; a file if left out");
-  study->add_option("--name", y.name, "of the study on the server; that of the folder if left out");
+  study->add_option("--store", y.store, "database on a server, postgresql://user@host/name; a file if left out")
+      ->check(is_given("an address"));
+  study->add_option("--name", y.name, "of the study on the server; that of the folder if left out")
+      ->check(is_given("a name"));
   CLI::Option* condensed =
       study->add_flag("--condensed", y.condensed,
                       "of a plan: run its like frames as one, at a tenth of the cost; whole runs confirm the bounds");

@@ -70,26 +70,12 @@ void check_for_plan(const std::string& file) {
                          "name the model: --evaluator \"command\"; a plan has its fuzzy values in [fuzzy]"}});
 }
 
-}  // namespace
-
-double read_seconds(const std::string& text, const char* option, double fallback) {
-  if (text.empty()) return fallback;
-  Quantity q = parse_quantity(text, Dimension::Time);
-  if (!q.value) {
-    const Quantity bare = parse_quantity(text, Dimension::Number);
-    if (bare.value) q = bare;
-  }
-  if (!q.value || !(*q.value > 0) || !std::isfinite(*q.value))
-    throw InputError("E801", fmt::format("{} \"{}\": {}", option, text, q.value ? "must be > 0" : q.problem),
-                     "units: " + units_of(Dimension::Time));
-  return *q.value;
-}
-
-StudyPlace make_place(const Arguments& a) {
-  make_folder(a.output);
+/// Where the study is to lie. Throws InputError like make_place.
+StudyPlace choose_place(const Arguments& a) {
   const fs::path folder = a.output;
   StudyPlace place;
-  const bool is_on_server = fs::exists(folder / place_file);
+  std::error_code failure;
+  const bool is_on_server = fs::exists(folder / place_file, failure);
   const auto refuse = [&a](const std::string& what) {
     throw InputError("E822", fmt::format("{} holds {}", a.output, what), "choose another folder or name, or delete it");
   };
@@ -117,9 +103,30 @@ StudyPlace make_place(const Arguments& a) {
     const std::string store = study::hide_password(place.store);
     if (there.name != place.name || study::hide_password(there.store) != store)
       refuse(fmt::format("the study \"{}\" of {}, not \"{}\" of {}", there.name, there.store, place.name, store));
-  } else if (fs::exists(folder / store_file)) {
+  } else if (fs::exists(folder / store_file, failure)) {
     refuse("a study in a file");
   }
+  return place;
+}
+
+}  // namespace
+
+double read_seconds(const std::string& text, const char* option, double fallback) {
+  if (text.empty()) return fallback;
+  Quantity q = parse_quantity(text, Dimension::Time);
+  if (!q.value) {
+    const Quantity bare = parse_quantity(text, Dimension::Number);
+    if (bare.value) q = bare;
+  }
+  if (!q.value || !(*q.value > 0) || !std::isfinite(*q.value))
+    throw InputError("E801", fmt::format("{} \"{}\": {}", option, text, q.value ? "must be > 0" : q.problem),
+                     "units: " + units_of(Dimension::Time));
+  return *q.value;
+}
+
+StudyPlace make_place(const Arguments& a) {
+  StudyPlace place = choose_place(a);
+  make_folder(a.output);
   return place;
 }
 

@@ -16,8 +16,8 @@ struct StudyPlace {
   std::string name = "main";
 };
 
-/// For a new study, or one to go on with; makes the folder. Throws InputError E801, E820, E822 (another study is
-/// there).
+/// For a new study, or one to go on with; makes the folder if nothing is wrong. Throws InputError E801, E820, E822
+/// (another study is there).
 StudyPlace make_place(const Arguments&);
 /// Notes in the folder on which server its study is.
 void keep_place(const std::string& folder, const StudyPlace&);

@@ -73,6 +73,10 @@ TEXT
   has err "this is not JSON"; has err "^"; has err "oops"
   expect 2 "$topple" study in.toml --evaluator "$model" -o a --alpha 0,2; has err "--alpha"
   expect 2 "$topple" study in.toml --evaluator "$model" -o a --store mysql://x; has err "is no server"
+  expect 2 "$topple" study in.toml --evaluator "$model" -o a --store ""; has err "--store"; has err "an address is wanted"
+  expect 2 "$topple" study in.toml --evaluator "$model" -o a --name ""; has err "a name is wanted"
+  expect 2 "$topple" study in.toml --evaluator "$model" -o a --name x; has err "only a study on a server has a name"
+  [ ! -e a ] || { echo "a folder was made for wrong arguments"; failures=$((failures + 1)); }
   expect 2 "$topple" study in.toml --evaluator "$model"; has err "--output"
   expect 2 "$topple" study "$plan" -o a; has err "fuzzy"
   expect 2 "$topple" study show nowhere; has err "there is no study"
