@@ -312,8 +312,8 @@ class Evaluator {
         const Reader reader{line, command_};
         while (next < points.size() && is_answered[next]) ++next;
         process_.end();
-        give(next, reader.refuse(0, fmt::format("a line without an end, {} MB so far", Process::longest_line >> 20),
-                                 "each answer is one line; the end of the line is missing"));
+        give(next, reader.refuse(0, fmt::format("the line is longer than {} MB", Process::longest_line >> 20),
+                                 "each answer is one line of at most so much; is the end of the line missing?"));
         return;
       }
       if (is_blank) continue;

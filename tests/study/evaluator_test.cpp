@@ -348,13 +348,17 @@ TEST(Evaluator, NeverTakesADoubledAnswerForAnotherPoint) {
   EXPECT_EQ(both[1].kind, Kind::Refused);
 }
 
-TEST(Evaluator, RefusesALineWithoutAnEnd) {
-  Model m("read line; yes | tr -d '\\n'");
-  const Answer a = m.ask({{1, 1}})[0];
-  ASSERT_EQ(a.kind, Kind::Refused);
-  const Refusal r = read_refusal(a.text);
-  EXPECT_NE(r.diagnostic.message.find("without an end"), std::string::npos) << r.diagnostic.message;
-  EXPECT_EQ(r.line, std::string(100, 'y'));
+TEST(Evaluator, RefusesALineThatIsTooLong) {
+  // without an end, and with one
+  for (const char* command :
+       {"read line; yes | tr -d '\\n'", "read line; yes | head -c 36000000 | tr -d '\\n'; echo"}) {
+    Model m(command);
+    const Answer a = m.ask({{1, 1}})[0];
+    ASSERT_EQ(a.kind, Kind::Refused);
+    const Refusal r = read_refusal(a.text);
+    EXPECT_EQ(r.diagnostic.message, "the line is longer than 16 MB");
+    EXPECT_EQ(r.line, std::string(100, 'y'));
+  }
 }
 
 TEST(Evaluator, TellsWhenItClosedItsOutputAndWentOn) {
