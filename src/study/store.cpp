@@ -11,8 +11,10 @@
 #include <limits>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <thread>
 
+#include "base/error.h"
 #include "base/hash.h"
 
 namespace topple::study {
@@ -26,11 +28,15 @@ json to_json(double x) {
   if (std::isnan(x)) return nullptr;
   return x > 0 ? "inf" : "-inf";
 }
+/// Throws json::exception or std::invalid_argument where it is no number.
 double to_number(const json& j) {
   if (j.is_number()) return j.get<double>();
   if (j.is_null()) return std::numeric_limits<double>::quiet_NaN();
   const double infinite = std::numeric_limits<double>::infinity();
-  return j.get<std::string>() == "inf" ? infinite : -infinite;
+  const std::string word = j.get<std::string>();
+  if (word == "inf") return infinite;
+  if (word == "-inf") return -infinite;
+  throw std::invalid_argument("a number is wanted");
 }
 
 /// Texts from elsewhere may hold bytes that are no UTF-8, which a database refuses.
@@ -47,17 +53,53 @@ std::string outputs_text(const Answer& a) {
   return j.dump();
 }
 
-/// From the columns status, outcome, outputs, trajectory, message, seconds.
-Answer read_answer(const Row& row, std::size_t first) {
+/// Throws json::exception or std::invalid_argument.
+std::vector<std::pair<std::string, double>> to_outputs(const std::string& text) {
+  const json j = json::parse(text);
+  if (!j.is_object()) throw std::invalid_argument("an object is wanted");
+  std::vector<std::pair<std::string, double>> outputs;
+  for (const auto& [name, value] : j.items()) outputs.emplace_back(name, to_number(value));
+  return outputs;
+}
+
+/// A row of a table of the store, for complaints.
+struct Place {
+  const std::string& address;
+  const char* table;
+  std::string hash;
+};
+
+/// What `read` makes of a column. Throws InputError E820 where that is damaged.
+template <class F>
+auto read_column(const Place& row, const char* column, F read) {
+  try {
+    return read();
+  } catch (const json::exception&) {
+    // not what was written
+  } catch (const std::logic_error&) {
+    // likewise
+  }
+  throw InputError("E820",
+                   fmt::format("{} is damaged: the row {} of the table {} has no valid {}", hide_password(row.address),
+                               row.hash, row.table, column),
+                   "take a copy that is whole, or begin in another store");
+}
+
+/// From the columns status, outcome, outputs, trajectory, message, seconds; the row begins with the hash.
+Answer read_answer(const std::string& address, const Row& row, std::size_t first) {
+  const Place place{address, "result", *row[0]};
   Answer a;
   a.kind = *row[first] == "done" ? Answer::Kind::Done : Answer::Kind::Failed;
   a.outcome = row[first + 1].value_or("");
-  const json outputs = json::parse(row[first + 2].value_or("{}"));
-  for (const auto& [name, value] : outputs.items()) a.outputs.emplace_back(name, to_number(value));
-  a.trajectory = to_numbers(row[first + 3].value_or("[]"));
+  a.outputs = read_column(place, "outputs", [&] { return to_outputs(row[first + 2].value_or("{}")); });
+  a.trajectory = read_column(place, "trajectory", [&] { return to_numbers(row[first + 3].value_or("[]")); });
   a.text = row[first + 4].value_or("");
-  a.seconds = std::stod(row[first + 5].value_or("0"));
+  a.seconds = read_column(place, "seconds", [&] { return std::stod(row[first + 5].value_or("0")); });
   return a;
+}
+
+Point read_inputs(const std::string& address, const std::string& hash, const std::string& text) {
+  return read_column(Place{address, "job", hash}, "inputs", [&] { return to_numbers(text); });
 }
 
 constexpr const char* result_columns =
@@ -197,8 +239,10 @@ std::string to_text(const std::vector<double>& numbers) {
 }
 
 std::vector<double> to_numbers(const std::string& text) {
+  const json list = json::parse(text);
+  if (!list.is_array()) throw std::invalid_argument("a list is wanted");
   std::vector<double> numbers;
-  for (const json& j : json::parse(text)) numbers.push_back(to_number(j));
+  for (const json& j : list) numbers.push_back(to_number(j));
   return numbers;
 }
 
@@ -360,7 +404,8 @@ std::vector<Job> Store::claim(const std::string& worker, int count, double lease
       true);
   std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return std::stoll(*a[0]) < std::stoll(*b[0]); });
   std::vector<Job> jobs;
-  for (const Row& r : rows) jobs.push_back({*r[1], *r[2], to_numbers(*r[3]), std::stoi(*r[4]), std::stoi(*r[5])});
+  for (const Row& r : rows)
+    jobs.push_back({*r[1], *r[2], read_inputs(address_, *r[1], *r[3]), std::stoi(*r[4]), std::stoi(*r[5])});
   return jobs;
 }
 
@@ -455,7 +500,7 @@ std::vector<StoredResult> Store::find_results(const std::vector<std::string>& ha
                                                  "FROM result WHERE hash IN {}",
                                                  db_->dialect().listed),
                                      {json(hashes).dump()}))
-          results.push_back({*r[0], {}, read_answer(r, 1)});
+          results.push_back({*r[0], {}, read_answer(address_, r, 1)});
         return results;
       },
       true);
@@ -470,7 +515,7 @@ std::vector<StoredResult> Store::load_results(const std::string& model) {
                       "r.seconds FROM job j JOIN result r ON r.hash = j.hash WHERE j.model = $1 ORDER BY "
                       "j.number",
                       {model}))
-          results.push_back({*r[0], to_numbers(*r[1]), read_answer(r, 2)});
+          results.push_back({*r[0], read_inputs(address_, *r[0], *r[1]), read_answer(address_, r, 2)});
         return results;
       },
       true);
@@ -521,16 +566,21 @@ void Store::forget_refusals(const std::string& model) {
 std::optional<AnswerForm> Store::find_form(const std::string& model) {
   return transact(
       [&](bool) -> std::optional<AnswerForm> {
-        const Rows rows = db_->run("SELECT outputs FROM result WHERE model = $1 AND status = 'done' LIMIT 1", {model});
+        const Rows rows =
+            db_->run("SELECT hash, outputs FROM result WHERE model = $1 AND status = 'done' LIMIT 1", {model});
         if (rows.empty()) return std::nullopt;
         AnswerForm form;
-        const json outputs = json::parse(rows[0][0].value_or("{}"));
-        for (const auto& [name, value] : outputs.items()) form.outputs.push_back(name);
+        const auto outputs = read_column(Place{address_, "result", *rows[0][0]}, "outputs",
+                                         [&] { return to_outputs(rows[0][1].value_or("{}")); });
+        for (const auto& [name, value] : outputs) form.outputs.push_back(name);
         std::sort(form.outputs.begin(), form.outputs.end());
         const Rows curves = db_->run(
-            "SELECT trajectory FROM result WHERE model = $1 AND status = 'done' AND trajectory <> '[]' LIMIT 1",
+            "SELECT hash, trajectory FROM result WHERE model = $1 AND status = 'done' AND trajectory <> '[]' LIMIT 1",
             {model});
-        if (!curves.empty()) form.ordinates = to_numbers(curves[0][0].value_or("[]")).size();
+        if (!curves.empty())
+          form.ordinates = read_column(Place{address_, "result", *curves[0][0]}, "trajectory", [&] {
+                             return to_numbers(curves[0][1].value_or("[]"));
+                           }).size();
         return form;
       },
       true);

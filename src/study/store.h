@@ -50,7 +50,7 @@ struct Counts {
 /// A name of a point under a model: the same for the same bits.
 std::string calc_job_hash(const std::string& model, const Point&);
 
-/// Numbers as a JSON array, back with the same bits (but for the payload of NaN).
+/// Numbers as a JSON array, back with the same bits (but for the payload of NaN). Another text is an exception.
 std::string to_text(const std::vector<double>&);
 std::vector<double> to_numbers(const std::string&);
 
@@ -58,7 +58,7 @@ std::vector<double> to_numbers(const std::string&);
 void on_waiting(std::function<void(const std::string&)>);
 
 /// One connection; belongs to one thread. Operations wait for a server that is away, up to `patience`, and are repeated
-/// where that is safe; then they throw ConnectionLost.
+/// where that is safe; then they throw ConnectionLost. Rows that cannot be read are an InputError E820.
 class Store {
  public:
   /// Creates what is missing, unless it is only read. Throws InputError E820, E821.

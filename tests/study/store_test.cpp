@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <set>
 #include <thread>
@@ -238,6 +240,43 @@ TEST_P(Stores, HoldARefusedJobUntilItIsForgotten) {
   EXPECT_TRUE(store.claim("w", 1, 60).empty());
   store.forget_refusals("m");
   EXPECT_EQ(store.claim("w", 1, 60).at(0).attempt, 1);
+}
+
+TEST_P(Stores, NameTheRowThatIsDamaged) {
+  Store store(address);
+  store.add_jobs("m", {{"abc", {1, 2}}});
+  store.finish(store.claim("w", 1, 60).at(0), "w", done(3));
+  const auto db = open_database(address);
+  const auto complaint = [](const std::function<void()>& read) -> std::string {
+    try {
+      read();
+    } catch (const InputError& e) {
+      const Diagnostic& d = e.diagnostics().front();
+      return d.code + " " + d.message + (d.help.empty() ? " without help" : "");
+    }
+    return "none";
+  };
+  for (const auto& [column, whole, wrong] :
+       std::vector<std::array<std::string, 3>>{{"outputs", R"({"z":3.0})", R"({"z":3.)"},
+                                               {"outputs", R"({"z":3.0})", "[3.0]"},
+                                               {"outputs", R"({"z":3.0})", R"({"z":"3"})"},
+                                               {"outputs", R"({"z":3.0})", ""},
+                                               {"trajectory", "[]", "[1,"},
+                                               {"trajectory", "[]", R"({"a":1})"}}) {
+    db->run("UPDATE result SET " + column + " = $1", {wrong});
+    const std::string expected =
+        "E820 " + hide_password(address) + " is damaged: the row abc of the table result has no valid " + column;
+    EXPECT_EQ(complaint([&] { store.find_results({"abc"}); }), expected) << wrong;
+    EXPECT_EQ(complaint([&] { store.load_results("m"); }), expected) << wrong;
+    EXPECT_EQ(complaint([&] { store.find_form("m"); }), expected) << wrong;
+    db->run("UPDATE result SET " + column + " = $1", {whole});
+  }
+  EXPECT_EQ(store.find_results({"abc"}).at(0).answer.outputs, done(3).outputs);
+  db->run("UPDATE job SET inputs = '[1, 2', state = 'waiting'");
+  const std::string expected =
+      "E820 " + hide_password(address) + " is damaged: the row abc of the table job has no valid inputs";
+  EXPECT_EQ(complaint([&] { store.load_results("m"); }), expected);
+  EXPECT_EQ(complaint([&] { store.claim("w", 1, 60); }), expected);
 }
 
 TEST_P(Stores, RememberStudiesAndModels) {
