@@ -13,6 +13,8 @@ namespace topple::uncertainty {
 namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
+constexpr double least_width = 1e-9;  // of the support: nearer places are one
+constexpr long most_planes = 200;     // the latest
 
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
   double sum = 0;
@@ -173,6 +175,12 @@ CutProgram::CutProgram(const Space& space, double alpha, std::vector<double> sca
       axes_(std::move(axes)),
       centre_(calc_centre(space)) {}
 
+std::vector<double> CutProgram::find_way(const Point& from, const Point& to) const {
+  std::vector<double> v(axes_.size());
+  for (std::size_t k = 0; k < v.size(); ++k) v[k] = (to[axes_[k]] - from[axes_[k]]) / scale_[axes_[k]];
+  return v;
+}
+
 Point CutProgram::move(const Point& base, const std::vector<double>& v) const {
   Point x = base;
   for (std::size_t k = 0; k < axes_.size(); ++k) x[axes_[k]] += v[k] * scale_[axes_[k]];
@@ -217,7 +225,7 @@ bool CutProgram::cut_off(const Point& x, const Point& base) {
   if (!g) return false;
   constexpr double step = 1e-7;  // of the support's width
   HalfSpace h;
-  double square = 0, base_at = 0;
+  double square = 0;
   for (const int i : axes_) {
     Point y = in;
     y[i] = in[i] + step * scale_[i];
@@ -228,13 +236,9 @@ bool CutProgram::cut_off(const Point& x, const Point& base) {
     square += h.a.back() * h.a.back();
   }
   if (!(square > 0) || !std::isfinite(square)) return false;
-  for (std::size_t k = 0; k < axes_.size(); ++k) {
-    const int i = axes_[k];
-    h.a[k] /= std::sqrt(square);
-    h.b += h.a[k] * (in[i] - centre_[i]) / scale_[i];
-    base_at += h.a[k] * (base[i] - centre_[i]) / scale_[i];
-  }
-  if (base_at > h.b + 1e-9) return false;
+  for (double& a : h.a) a /= std::sqrt(square);
+  h.b = dot(h.a, find_way(centre_, in));
+  if (dot(h.a, find_way(centre_, base)) > h.b + least_width) return false;
   planes_.push_back(std::move(h));
   return true;
 }
@@ -242,12 +246,15 @@ bool CutProgram::cut_off(const Point& x, const Point& base) {
 Point CutProgram::find_place(const Point& base, const Quadratic& q, double reach, const std::vector<HalfSpace>& sides,
                              std::vector<double> start) {
   const std::size_t n = axes_.size();
-  std::vector<double> lower(n), upper(n), from(n);
+  const std::vector<double> from = find_way(centre_, base);
+  // planes that cut off a place of the cut: it is not convex there
+  std::erase_if(planes_, [&](const HalfSpace& h) { return dot(h.a, from) > h.b + least_width; });
+  if (std::ssize(planes_) > most_planes) planes_.erase(planes_.begin(), planes_.end() - most_planes);
+  std::vector<double> lower(n), upper(n);
   for (std::size_t k = 0; k < n; ++k) {
     const int i = axes_[k];
     lower[k] = std::min(0.0, std::max(-reach, (box_.lower[i] - base[i]) / scale_[i]));
     upper[k] = std::max(0.0, std::min(reach, (box_.upper[i] - base[i]) / scale_[i]));
-    from[k] = (base[i] - centre_[i]) / scale_[i];
   }
   Point x = base;
   for (int round = 0; round < 100; ++round) {
@@ -269,8 +276,8 @@ Point CutProgram::find_place(const Point& base, const Quadratic& q, double reach
     x = move(base, v);
     const Point pulled = pull(base, x);
     double off = 0;
-    for (const int i : axes_) off = std::max(off, std::abs(pulled[i] - x[i]) / scale_[i]);
-    if (off < 1e-9) return pulled;
+    for (const double c : find_way(x, pulled)) off = std::max(off, std::abs(c));
+    if (off < least_width) return pulled;
     if (!cut_off(x, base)) return pulled;
   }
   return pull(base, x);
@@ -279,13 +286,6 @@ Point CutProgram::find_place(const Point& base, const Quadratic& q, double reach
 Point CutProgram::minimise_from(const Point& base, const Quadratic& q, double reach,
                                 const std::vector<HalfSpace>& sides) {
   const std::size_t n = axes_.size();
-  // planes that cut off a place of the cut: it is not convex there
-  std::erase_if(planes_, [&](const HalfSpace& h) {
-    double at = -h.b;
-    for (std::size_t k = 0; k < n; ++k) at += h.a[k] * (base[axes_[k]] - centre_[axes_[k]]) / scale_[axes_[k]];
-    return at > 1e-9;
-  });
-  if (planes_.size() > 200) planes_.erase(planes_.begin(), planes_.end() - 200);
   Random random(1);
   Point best = base;
   double least = 0;
@@ -294,20 +294,15 @@ Point CutProgram::minimise_from(const Point& base, const Quadratic& q, double re
     if (turn > 0)
       for (double& c : start) c = reach * random.next(-1, 1);
     Point x = find_place(base, q, reach, sides, std::move(start));
-    std::vector<double> v(n);
-    for (std::size_t k = 0; k < n; ++k) v[k] = (x[axes_[k]] - base[axes_[k]]) / scale_[axes_[k]];
-    if (const double value = q(v); value < least) least = value, best = std::move(x);
+    if (const double value = q(find_way(base, x)); value < least) least = value, best = std::move(x);
   }
   return best;
 }
 
 Point CutProgram::project_from(const Point& base, const Point& target, double reach) {
   const std::size_t n = axes_.size();
-  Quadratic q{std::vector<double>(n), std::vector<double>(n * n, 0.0)};
-  for (std::size_t k = 0; k < n; ++k) {
-    q.slope[k] = -(target[axes_[k]] - base[axes_[k]]) / scale_[axes_[k]];
-    q.hessian[k * n + k] = 1;
-  }
+  Quadratic q{find_way(target, base), std::vector<double>(n * n, 0.0)};
+  for (std::size_t k = 0; k < n; ++k) q.hessian[k * n + k] = 1;
   return find_place(base, q, reach, {}, std::vector<double>(n, 0.0));
 }
 
@@ -342,8 +337,7 @@ Point find_most_possible(const Space& space, const std::vector<double>& scale, c
       std::vector<HalfSpace> rows{side};
       for (const HalfSpace& h : cut.planes_) {
         rows.push_back(h);
-        for (std::size_t k = 0; k < n; ++k)
-          rows.back().b -= h.a[k] * (base[axes[k]] - cut.centre_[axes[k]]) / scale[axes[k]];
+        rows.back().b -= dot(h.a, cut.find_way(cut.centre_, base));
       }
       v[n] = lower[n];
       for (HalfSpace& h : rows) {

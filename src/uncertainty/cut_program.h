@@ -40,6 +40,7 @@ class CutProgram {
                                   double, const HalfSpace&);
   bool contains(const Point& x) const { return is_in_cut(space_, box_, alpha_, x); }
   bool cut_off(const Point& x, const Point& base);
+  std::vector<double> find_way(const Point& from, const Point& to) const;  // by widths
   Point move(const Point& base, const std::vector<double>& v) const;
   Point pull(const Point& base, Point x) const;
   Point find_place(const Point& base, const Quadratic& q, double reach, const std::vector<HalfSpace>& sides,
