@@ -244,7 +244,7 @@ bool CutProgram::cut_off(const Point& x, const Point& base) {
 }
 
 Point CutProgram::find_place(const Point& base, const Quadratic& q, double reach, const std::vector<HalfSpace>& sides,
-                             std::vector<double> start) {
+                             const std::vector<double>& start) {
   const std::size_t n = axes_.size();
   const std::vector<double> from = find_way(centre_, base);
   // planes that cut off a place of the cut: it is not convex there
@@ -274,7 +274,7 @@ Point CutProgram::find_place(const Point& base, const Quadratic& q, double reach
     for (double& c : v) c *= part;
     v = minimise(q, planes, lower, upper, std::move(v));
     x = move(base, v);
-    const Point pulled = pull(base, x);
+    Point pulled = pull(base, x);
     double off = 0;
     for (const double c : find_way(x, pulled)) off = std::max(off, std::abs(c));
     if (off < least_width) return pulled;
@@ -293,7 +293,7 @@ Point CutProgram::minimise_from(const Point& base, const Quadratic& q, double re
     std::vector<double> start(n, 0.0);
     if (turn > 0)
       for (double& c : start) c = reach * random.next(-1, 1);
-    Point x = find_place(base, q, reach, sides, std::move(start));
+    Point x = find_place(base, q, reach, sides, start);
     if (const double value = q(find_way(base, x)); value < least) least = value, best = std::move(x);
   }
   return best;

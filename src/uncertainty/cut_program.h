@@ -44,7 +44,7 @@ class CutProgram {
   Point move(const Point& base, const std::vector<double>& v) const;
   Point pull(const Point& base, Point x) const;
   Point find_place(const Point& base, const Quadratic& q, double reach, const std::vector<HalfSpace>& sides,
-                   std::vector<double> start);
+                   const std::vector<double>& start);
 
   const Space& space_;
   double alpha_;
