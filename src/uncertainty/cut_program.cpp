@@ -223,16 +223,19 @@ bool CutProgram::cut_off(const Point& x, const Point& base) {
     }
   if (!g && space_.joint) g = [this](const Point& y) { return alpha_ - space_.joint(y); };
   if (!g) return false;
-  constexpr double step = 1e-7;  // of the support's width
-  HalfSpace h;
-  double square = 0;
-  for (const int i : axes_) {
+  const auto calc_slope = [&](int i, double step) {
     Point y = in;
     y[i] = in[i] + step * scale_[i];
     const double above = g(y);
     y[i] = in[i] - step * scale_[i];
-    const double below = g(y);
-    h.a.push_back((above - below) / (2 * step));
+    return (above - g(y)) / (2 * step);
+  };
+  HalfSpace h;
+  double square = 0;
+  for (const int i : axes_) {
+    // near, since there are kinks; but of what is straight for far the round-off is small
+    const double near = calc_slope(i, 1e-7), far = calc_slope(i, 1e-2);
+    h.a.push_back(std::abs(far - near) <= 1e-6 * std::abs(near) + 1e-8 ? far : near);
     square += h.a.back() * h.a.back();
   }
   if (!(square > 0) || !std::isfinite(square)) return false;

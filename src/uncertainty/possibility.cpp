@@ -70,6 +70,7 @@ class Climb {
         support_(make_box(space, 0)) {
     for (int i = 0; i < space.size(); ++i)
       if (space.inputs[i].width() > 0) axes_.push_back(i);
+    if (space.has_interaction()) cut_.emplace(space, 0, calc_scale(space), axes_);
   }
 
   bool is_done() const { return stage_ == Stage::Done; }
@@ -241,8 +242,12 @@ class Climb {
         walled_ = best_;
         return {};
       }
-      wall_.emplace(support_, calc_scale(space_), axes_, best_x_, nearest->x, reach_,
-                    [this](const Point& x) { return calc_membership(space_, x) > 0; });
+      WallProbe::Project project;
+      if (cut_)
+        project = [this](const Point& from, const Point& to) { return cut_->project_from(from, to, 10 * reach_); };
+      wall_.emplace(
+          support_, calc_scale(space_), axes_, best_x_, nearest->x, reach_,
+          [this](const Point& x) { return calc_membership(space_, x) > 0; }, std::move(project));
       if (wall_->is_done()) stage_ = Stage::Lead;
     }
     return wall_->pending();
@@ -365,6 +370,7 @@ class Climb {
   double beside_ = -1;  // largest μ of runs outside the support, moved there, as long as none lies inside
   int sample_ = -1, seen_ = 0, round_ = 0;
   bool converged_ = false;
+  std::optional<CutProgram> cut_;  // the support, with interaction
   std::optional<WallProbe> wall_;
   static constexpr double largest_reach = 0.2, smallest_reach = 1e-4;  // of a plane, by widths
   static constexpr int most_leads = 30;

@@ -233,6 +233,17 @@ TEST(PossibilityPhysics, UnderAJointMembershipWithEdges) {
   EXPECT_NEAR(find(space, make_classes(is_over)).possibilities.classes[1].possibility, 26.0 / 41, 1e-5);
 }
 
+// x + y + z = 14 as two constraints that leave round-off: x = 10 - 7α and z = 5α differ by 3 at 7/12.
+TEST(PossibilityPhysics, OnAPlaneThatConstraintsLeave) {
+  const auto calc_excess = [](double a, double b) { return a - b - 1e-12 * std::max(a, b); };
+  const Space space{{make_triangular(0, 3, 10), make_triangular(0, 6, 10), make_triangular(0, 5, 10)},
+                    {[=](const Point& x) { return calc_excess(x[0] + x[1] + x[2], 14); },
+                     [=](const Point& x) { return calc_excess(14, x[0] + x[1] + x[2]); }},
+                    {}};
+  const Found f = find(space, make_classes([](const Point& x) { return x[0] - x[2] > 3 ? 1 : 0; }));
+  EXPECT_NEAR(f.possibilities.classes[1].possibility, 7.0 / 12, 1e-5);
+}
+
 TEST(PossibilityReplay, ResumedEqualsUninterrupted) {
   const Space space{cases::make_jump_inputs(), {}, {}};
   const Progress progress;
