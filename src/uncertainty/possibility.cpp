@@ -94,7 +94,9 @@ class Climb {
       const Point& x = archive[seen_].x;
       if (support_.contains(x)) {
         const double mu = calc_membership(space_, x);
-        if (mu > best_ || sample_ < 0) best_ = mu, sample_ = seen_, best_x_ = x;
+        // on a plateau of a joint membership the one from which the way up may be short
+        const bool is_nearer = cut_ && sample_ >= 0 && mu == best_ && calc_distance(x) < calc_distance(best_x_);
+        if (mu > best_ || sample_ < 0 || is_nearer) best_ = mu, sample_ = seen_, best_x_ = x;
       } else if (sample_ < 0) {
         Point moved = clip(support_, x);
         if (const double mu = calc_membership(space_, moved); mu > beside_) beside_ = mu, best_x_ = std::move(moved);
@@ -136,6 +138,7 @@ class Climb {
   /// After the points were run.
   void tell(const Archive& archive) {
     const double before = best_;
+    const Point from = best_x_;
     const bool had_sample = sample_ >= 0;
     refresh(archive);
     switch (stage_) {
@@ -150,7 +153,7 @@ class Climb {
         break;
       }
       case Stage::Lead:
-        learn(best_ - before);
+        learn(best_ - before, best_x_ != from);
         break;
       case Stage::Look:
         if (best_ > before || (sample_ >= 0 && !had_sample)) {
@@ -262,22 +265,46 @@ class Climb {
       const double distance = wall_->calc_distance(best_x_);
       for (const double part : {0.0, 0.01, 0.03, 0.1, 0.3}) {
         side.b = distance - part * reach_;
-        const Point x = find_most_possible(space_, calc_scale(space_), axes_, best_x_, 2 * reach_, side);
+        Point x = find_most_possible(space_, calc_scale(space_), axes_, best_x_, 2 * reach_, side);
         if (part == 0) promised_ = calc_membership(space_, x) - best_;
+        const bool is_flat = cut_ && !(promised_ > 0);
+        if (is_flat) x = find_nearest_to_centre(side);
         for (const double way : {1.0, 0.5, 0.25}) {
           Point y = best_x_;
           for (const int i : axes_) y[i] += way * (x[i] - best_x_[i]);
-          if (calc_membership(space_, y) > best_) add(points, clip(support_, std::move(y)));
+          const double mu = calc_membership(space_, y);
+          if (is_flat ? mu >= best_ : mu > best_) add(points, clip(support_, std::move(y)));
         }
       }
     }
-    if (points.empty()) learn(0);
+    if (points.empty()) learn(0, false);
     return points;
   }
 
+  /// Of a half space that is seen from the best place: on a plateau the way up begins there.
+  Point find_nearest_to_centre(const HalfSpace& side) const {
+    const std::size_t n = axes_.size();
+    const Point centre = calc_centre(space_);
+    Quadratic q{std::vector<double>(n), std::vector<double>(n * n, 0.0)};
+    std::vector<double> lower(n), upper(n);
+    for (std::size_t k = 0; k < n; ++k) {
+      const int i = axes_[k];
+      const double width = space_.inputs[i].width();
+      q.slope[k] = (best_x_[i] - centre[i]) / width;
+      q.hessian[k * n + k] = 1;
+      lower[k] = std::max(-2 * reach_, (support_.lower[i] - best_x_[i]) / width);
+      upper[k] = std::min(2 * reach_, (support_.upper[i] - best_x_[i]) / width);
+    }
+    const HalfSpace own{side.a, std::max(side.b, 0.0)};
+    const std::vector<double> v = minimise(q, {own}, lower, upper, std::vector<double>(n, 0.0));
+    Point x = best_x_;
+    for (std::size_t k = 0; k < n; ++k) x[axes_[k]] += v[k] * space_.inputs[axes_[k]].width();
+    return clip(support_, std::move(x));
+  }
+
   /// Goes on farther or nearer, by what has come of what the plane promised.
-  void learn(double gained) {
-    const double part = promised_ > 0 ? gained / promised_ : 0;
+  void learn(double gained, bool moved) {
+    const double part = promised_ > 0 ? gained / promised_ : moved ? 1 : 0;
     reach_ = std::min(largest_reach, reach_ * (part > 0.5 ? 1.2 : part > 0.2 ? 0.5 : 0.25));
     wall_.reset();
     stage_ = Stage::Wall;
@@ -321,7 +348,14 @@ class Climb {
   /// input anywhere in it: other islands of the class; and more spread points.
   std::vector<Point> ask_moved(const Archive& archive) {
     const int n = static_cast<int>(axes_.size());
-    const Box box = make_box(space_, std::min(best_ + options_.tolerance, 1.0));
+    const double above = std::min(best_ + options_.tolerance, 1.0);
+    const Box box = make_box(space_, above);
+    CutProgram cut(space_, above, calc_scale(space_), axes_);
+    const Point centre = calc_centre(space_);
+    const auto pull = [&](const Point& x) {
+      Point inside = clip(box, x);
+      return !cut_ || is_in_cut(space_, box, above, inside) ? inside : cut.project_from(centre, inside, 1);
+    };
     std::vector<std::pair<double, int>> ours;
     for (int i = 0; i < seen_; ++i)
       if (outcome_of(archive[i].result) == outcome_) ours.emplace_back(-calc_membership(space_, archive[i].x), i);
@@ -329,13 +363,13 @@ class Climb {
     std::vector<Point> points;
     // the best ones, and as many of the others
     const std::size_t most = 10 * static_cast<std::size_t>(n), rest = ours.size() > most ? ours.size() - most : 0;
-    for (std::size_t k = 0; k < std::min(most, ours.size()); ++k) add(points, clip(box, archive[ours[k].second].x));
+    for (std::size_t k = 0; k < std::min(most, ours.size()); ++k) add(points, pull(archive[ours[k].second].x));
     for (std::size_t k = 0; k < std::min(most, rest); ++k)
-      add(points, clip(box, archive[ours[most + k * rest / std::min(most, rest)].second].x));
+      add(points, pull(archive[ours[most + k * rest / std::min(most, rest)].second].x));
     constexpr int parts = 8;
     const std::size_t others = std::min<std::size_t>(2, ours.size() / 4);
     for (std::size_t k = 0; k <= others && k < ours.size(); ++k) {
-      const Point x = clip(box, archive[ours[k * (ours.size() - 1) / 4].second].x);
+      const Point x = pull(archive[ours[k * (ours.size() - 1) / 4].second].x);
       for (const int i : axes_)
         for (int part = 0; part < parts; ++part) {
           Point y = x;
@@ -351,6 +385,14 @@ class Climb {
     }
     if (points.empty()) converged_ = sample_ >= 0, stage_ = Stage::Done;
     return points;
+  }
+
+  /// From the centre, by widths.
+  double calc_distance(const Point& x) const {
+    const Point centre = calc_centre(space_);
+    double square = 0;
+    for (const int i : axes_) square += std::pow((x[i] - centre[i]) / space_.inputs[i].width(), 2);
+    return std::sqrt(square);
   }
 
   void add(std::vector<Point>& points, Point x) const {

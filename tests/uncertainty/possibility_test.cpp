@@ -233,6 +233,23 @@ TEST(PossibilityPhysics, UnderAJointMembershipWithEdges) {
   EXPECT_NEAR(find(space, make_classes(is_over)).possibilities.classes[1].possibility, 26.0 / 41, 1e-5);
 }
 
+// Most of the class lies on a plateau at 0.4; what is more possible is a sliver at its edge, up to where x y = 6, x is
+// at the end of its cut, x = 3μ, and the joint membership is μ as well.
+TEST(PossibilityPhysics, BesideAPlateau) {
+  double low = 0.4, high = 0.42;
+  while (high - low > 1e-12) {
+    const double mu = 0.5 * (low + high);
+    (1.6 - std::sqrt(std::pow(3 * mu - 3, 2) + 2 * std::pow(2 / mu - 6, 2)) / 2 > mu ? low : high) = mu;
+  }
+  const Space space{{make_triangular(0, 3, 10), make_triangular(0, 6, 10)}, {}, [](const Point& x) {
+                      const double r = std::sqrt(std::pow(x[0] - 3, 2) + 2 * std::pow(x[1] - 6, 2));
+                      return std::min(1.0, std::max(0.4, 1.6 - r / 2));
+                    }};
+  const Evaluate model = make_classes([](const Point& x) { return x[0] * x[1] < 6 ? 1 : 0; });
+  for (const std::uint64_t seed : {1, 2, 3})
+    EXPECT_NEAR(find(space, model, seed).possibilities.classes[1].possibility, low, 3e-5) << seed;
+}
+
 // x + y + z = 14 as two constraints that leave round-off: x = 10 - 7α and z = 5α differ by 3 at 7/12.
 TEST(PossibilityPhysics, OnAPlaneThatConstraintsLeave) {
   const auto calc_excess = [](double a, double b) { return a - b - 1e-12 * std::max(a, b); };
