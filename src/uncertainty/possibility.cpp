@@ -239,7 +239,7 @@ class Climb {
           distance = std::max(distance, std::abs(s.x[i] - best_x_[i]) / space_.inputs[i].width());
         if (nearest == nullptr || distance < least) least = distance, nearest = &s;
       }
-      const bool promises_nothing = reach_ < 0.02 && promised_ < 0.1 * options_.tolerance;
+      const bool promises_nothing = reach_ < 0.004 && promised_ < 0.1 * options_.tolerance;
       if (nearest == nullptr || promises_nothing || reach_ < smallest_reach || leads_++ >= most_leads) {
         stage_ = best_ > walled_from_ + options_.tolerance ? Stage::Start : Stage::Look;
         walled_ = best_;
