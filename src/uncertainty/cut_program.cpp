@@ -196,25 +196,14 @@ Point CutProgram::pull(const Point& base, Point x) const {
     y = clip(box_, std::move(y));
     if (contains(y)) return y;
   }
-  Point inside = base;
-  for (int k = 0; k < 40; ++k) {
-    Point middle = inside;
-    for (const int i : axes_) middle[i] = 0.5 * (inside[i] + x[i]);
-    (contains(middle) ? inside : x) = std::move(middle);
-  }
-  return inside;
+  return bisect(base, std::move(x), [this](const Point& y) { return contains(y); }).first;
 }
 
 /// Adds the half space that supports the cut where the way from its centre to x leaves it. False where there is none
 /// that keeps `base`.
 bool CutProgram::cut_off(const Point& x, const Point& base) {
-  Point in = centre_, out = x;
-  for (int k = 0; k < 60; ++k) {
-    Point middle = in;
-    for (const int i : axes_) middle[i] = 0.5 * (in[i] + out[i]);
-    if (middle == in || middle == out) break;
-    (contains(middle) ? in : out) = std::move(middle);
-  }
+  const auto [in, out] = bisect(
+      centre_, x, [this](const Point& y) { return contains(y); }, 60);
   std::function<double(const Point&)> g;
   for (const auto& c : space_.constraints)
     if (!(c(out) <= 0)) {

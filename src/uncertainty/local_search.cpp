@@ -18,13 +18,7 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 Point pull_inside(const Region& region, const Point& from, Point to) {
   to = clip(region.box, std::move(to));
   if (!region.space->has_interaction() || region.contains(to)) return to;
-  Point inside = from;
-  for (int k = 0; k < 40; ++k) {
-    Point middle(to.size());
-    for (std::size_t i = 0; i < to.size(); ++i) middle[i] = 0.5 * (inside[i] + to[i]);
-    (region.contains(middle) ? inside : to) = std::move(middle);
-  }
-  return inside;
+  return bisect(from, std::move(to), [&region](const Point& x) { return region.contains(x); }).first;
 }
 
 Region make_region(const Space& space, double alpha) {

@@ -67,10 +67,12 @@ class Climb {
         outcome_(outcome),
         options_(options),
         random_(options.seed + 31 * static_cast<size_t>(outcome + 2)),
-        support_(make_box(space, 0)) {
+        support_(make_box(space, 0)),
+        scale_(calc_scale(space)),
+        centre_(calc_centre(space)) {
     for (int i = 0; i < space.size(); ++i)
       if (space.inputs[i].width() > 0) axes_.push_back(i);
-    if (space.has_interaction()) cut_.emplace(space, 0, calc_scale(space), axes_);
+    if (space.has_interaction()) cut_.emplace(space, 0, scale_, axes_);
   }
 
   bool is_done() const { return stage_ == Stage::Done; }
@@ -235,8 +237,7 @@ class Climb {
       for (const Sample& s : archive.samples()) {
         if (outcome_of(s.result) == outcome_ || !(calc_membership(space_, s.x) > best_)) continue;
         double distance = 0;
-        for (const int i : axes_)
-          distance = std::max(distance, std::abs(s.x[i] - best_x_[i]) / space_.inputs[i].width());
+        for (const int i : axes_) distance = std::max(distance, std::abs(s.x[i] - best_x_[i]) / scale_[i]);
         if (nearest == nullptr || distance < least) least = distance, nearest = &s;
       }
       const bool promises_nothing = reach_ < 0.004 && promised_ < 0.1 * options_.tolerance;
@@ -249,7 +250,7 @@ class Climb {
       if (cut_)
         project = [this](const Point& from, const Point& to) { return cut_->project_from(from, to, 10 * reach_); };
       wall_.emplace(
-          support_, calc_scale(space_), axes_, best_x_, nearest->x, reach_,
+          support_, scale_, axes_, best_x_, nearest->x, reach_,
           [this](const Point& x) { return calc_membership(space_, x) > 0; }, std::move(project));
       if (wall_->is_done()) stage_ = Stage::Lead;
     }
@@ -265,7 +266,7 @@ class Climb {
       const double distance = wall_->calc_distance(best_x_);
       for (const double part : {0.0, 0.01, 0.03, 0.1, 0.3}) {
         side.b = distance - part * reach_;
-        Point x = find_most_possible(space_, calc_scale(space_), axes_, best_x_, 2 * reach_, side);
+        Point x = find_most_possible(space_, scale_, axes_, best_x_, 2 * reach_, side);
         if (part == 0) promised_ = calc_membership(space_, x) - best_;
         const bool is_flat = cut_ && !(promised_ > 0);
         if (is_flat) x = find_nearest_to_centre(side);
@@ -284,21 +285,19 @@ class Climb {
   /// Of a half space that is seen from the best place: on a plateau the way up begins there.
   Point find_nearest_to_centre(const HalfSpace& side) const {
     const std::size_t n = axes_.size();
-    const Point centre = calc_centre(space_);
     Quadratic q{std::vector<double>(n), std::vector<double>(n * n, 0.0)};
     std::vector<double> lower(n), upper(n);
     for (std::size_t k = 0; k < n; ++k) {
       const int i = axes_[k];
-      const double width = space_.inputs[i].width();
-      q.slope[k] = (best_x_[i] - centre[i]) / width;
+      q.slope[k] = (best_x_[i] - centre_[i]) / scale_[i];
       q.hessian[k * n + k] = 1;
-      lower[k] = std::max(-2 * reach_, (support_.lower[i] - best_x_[i]) / width);
-      upper[k] = std::min(2 * reach_, (support_.upper[i] - best_x_[i]) / width);
+      lower[k] = std::max(-2 * reach_, (support_.lower[i] - best_x_[i]) / scale_[i]);
+      upper[k] = std::min(2 * reach_, (support_.upper[i] - best_x_[i]) / scale_[i]);
     }
     const HalfSpace own{side.a, std::max(side.b, 0.0)};
     const std::vector<double> v = minimise(q, {own}, lower, upper, std::vector<double>(n, 0.0));
     Point x = best_x_;
-    for (std::size_t k = 0; k < n; ++k) x[axes_[k]] += v[k] * space_.inputs[axes_[k]].width();
+    for (std::size_t k = 0; k < n; ++k) x[axes_[k]] += v[k] * scale_[axes_[k]];
     return clip(support_, std::move(x));
   }
 
@@ -350,11 +349,10 @@ class Climb {
     const int n = static_cast<int>(axes_.size());
     const double above = std::min(best_ + options_.tolerance, 1.0);
     const Box box = make_box(space_, above);
-    CutProgram cut(space_, above, calc_scale(space_), axes_);
-    const Point centre = calc_centre(space_);
+    CutProgram cut(space_, above, scale_, axes_);
     const auto pull = [&](const Point& x) {
       Point inside = clip(box, x);
-      return !cut_ || is_in_cut(space_, box, above, inside) ? inside : cut.project_from(centre, inside, 1);
+      return !cut_ || is_in_cut(space_, box, above, inside) ? inside : cut.project_from(centre_, inside, 1);
     };
     std::vector<std::pair<double, int>> ours;
     for (int i = 0; i < seen_; ++i)
@@ -389,9 +387,8 @@ class Climb {
 
   /// From the centre, by widths.
   double calc_distance(const Point& x) const {
-    const Point centre = calc_centre(space_);
     double square = 0;
-    for (const int i : axes_) square += std::pow((x[i] - centre[i]) / space_.inputs[i].width(), 2);
+    for (const int i : axes_) square += std::pow((x[i] - centre_[i]) / scale_[i], 2);
     return std::sqrt(square);
   }
 
@@ -404,6 +401,7 @@ class Climb {
   const PossibilityOptions& options_;
   Random random_;
   Box support_;
+  Point scale_, centre_;  // widths of the supports, middle of the cores
   std::vector<int> axes_;
   Stage stage_ = Stage::Start;
   Bracket bracket_;

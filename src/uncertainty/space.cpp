@@ -83,6 +83,16 @@ bool is_in_cut(const Space& space, const Box& box, double alpha, const Point& x)
   return mu > 0 && mu >= alpha;
 }
 
+std::pair<Point, Point> bisect(Point in, Point out, const std::function<bool(const Point&)>& counts, int halvings) {
+  for (int k = 0; k < halvings; ++k) {
+    Point middle(out.size());
+    for (std::size_t i = 0; i < out.size(); ++i) middle[i] = 0.5 * (in[i] + out[i]);
+    if (middle == in || middle == out) break;
+    (counts(middle) ? in : out) = std::move(middle);
+  }
+  return {std::move(in), std::move(out)};
+}
+
 std::vector<Point> make_sobol_points(int n, int first, int count, std::uint64_t seed) {
   boost::random::sobol engine(static_cast<std::size_t>(n));
   engine.discard(static_cast<boost::uintmax_t>(first) * static_cast<boost::uintmax_t>(n));

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "uncertainty/fuzzy_number.h"
@@ -48,6 +49,9 @@ Point clip(const Box&, Point);
 Box make_box(const Space&, double alpha);
 /// Whether x belongs to the cut at alpha, whose box is given: with interaction.
 bool is_in_cut(const Space&, const Box&, double alpha, const Point& x);
+
+/// The last place that counts on the way to `out`, which does not, from `in`, which does, and the first behind it.
+std::pair<Point, Point> bisect(Point in, Point out, const std::function<bool(const Point&)>& counts, int halvings = 40);
 
 /// `count` points of a Sobol sequence in [0, 1)^n from its `first` point on, shifted by the seed (modulo 1).
 std::vector<Point> make_sobol_points(int n, int first, int count, std::uint64_t seed);

@@ -52,14 +52,24 @@ TEST(StudyReference, FindsBoundsAndPossibilityOfTheJump) {
   EXPECT_LE(r.alpha.archive.size(), 10000u);
 }
 
-/// Runs of a mapping of all inputs: their sum, and whether an outcome happens.
-RunnerFactories make_sum_factories(std::function<bool(const Point&)> happens) {
-  return {{"small", [happens = std::move(happens)](const std::string&) -> Runner {
-             return [happens](auto points, const auto& give, const auto&) {
-               for (std::size_t i = 0; i < points.size(); ++i) {
-                 const double sum = std::accumulate(points[i].begin(), points[i].end(), 0.0);
-                 give(i, {Answer::Kind::Done, {{"y", sum}}, happens(points[i]) ? "in" : "out", {}, "", 0});
-               }
+/// A problem of the inputs x0, x1 ... whose runs `make_factories` makes.
+Problem make_problem(std::vector<uncertainty::FuzzyNumber> inputs, int limit) {
+  Problem p;
+  p.kind = "small";
+  for (std::size_t i = 0; i < inputs.size(); ++i) p.inputs.push_back({"x" + std::to_string(i), "", 1});
+  p.space.inputs = std::move(inputs);
+  p.limit = limit;
+  return p;
+}
+
+double calc_sum(const Point& x) { return std::accumulate(x.begin(), x.end(), 0.0); }
+
+/// Runs of a mapping of all inputs: a value, and whether an outcome happens.
+RunnerFactories make_factories(std::function<double(const Point&)> calc, std::function<bool(const Point&)> happens) {
+  return {{"small", [calc = std::move(calc), happens = std::move(happens)](const std::string&) -> Runner {
+             return [calc, happens](auto points, const auto& give, const auto&) {
+               for (std::size_t i = 0; i < points.size(); ++i)
+                 give(i, {Answer::Kind::Done, {{"y", calc(points[i])}}, happens(points[i]) ? "in" : "out", {}, "", 0});
              };
            }}};
 }
@@ -73,14 +83,9 @@ double find_possibility(const StudyResult& r, const std::string& outcome) {
 TEST(StudyReference, FindsThePossibilityBeforeBoundsOfOutcomesTakeAllRuns) {
   // the box is touched at its corner x0 = -s, all others 2 s, with s = 1 - alpha
   const Folder folder;
-  Problem p;
-  p.kind = "small";
-  for (int i = 0; i < 8; ++i) {
-    p.inputs.push_back({"x" + std::to_string(i), "", 1});
-    p.space.inputs.push_back(uncertainty::make_triangular(-1, 0, 2));
-  }
-  p.limit = 10000;
-  const StudyResult r = run(p, make_options(folder / "s"), make_sum_factories([](const Point& x) {
+  const Problem p =
+      make_problem(std::vector<uncertainty::FuzzyNumber>(8, uncertainty::make_triangular(-1, 0, 2)), 10000);
+  const StudyResult r = run(p, make_options(folder / "s"), make_factories(calc_sum, [](const Point& x) {
                               return std::inner_product(x.begin(), x.end(), x.begin(), 0.0) - x[0] > 6;
                             }));
   const double s = (-1 + std::sqrt(1 + 4 * 29 * 6.0)) / (2 * 29);  // 29 s^2 + s = 6
@@ -90,19 +95,16 @@ TEST(StudyReference, FindsThePossibilityBeforeBoundsOfOutcomesTakeAllRuns) {
 TEST(StudyReference, SpreadsWhatSearchesLeaveForSmallIslands) {
   // three discs; the most possible one takes 0.3 % of the support
   const Folder folder;
-  Problem p;
-  p.kind = "small";
-  p.inputs = {{"x0", "", 1}, {"x1", "", 1}};
-  p.space.inputs = {uncertainty::make_triangular(0, 3, 10), uncertainty::make_triangular(0, 6, 10)};
-  p.limit = 10000;
+  Problem p = make_problem({uncertainty::make_triangular(0, 3, 10), uncertainty::make_triangular(0, 6, 10)}, 10000);
   for (const std::uint64_t seed : {1, 2}) {
     p.seed = seed;
-    const StudyResult r = run(p, make_options(folder / std::to_string(seed)), make_sum_factories([](const Point& x) {
-                                const auto is_near = [&x](double a, double b, double radius) {
-                                  return std::hypot(x[0] - a, x[1] - b) <= radius;
-                                };
-                                return is_near(9, 9, 0.3) || is_near(8, 2, 0.3) || is_near(1, 1, 0.4);
-                              }));
+    const StudyResult r =
+        run(p, make_options(folder / std::to_string(seed)), make_factories(calc_sum, [](const Point& x) {
+              const auto is_near = [&x](double a, double b, double radius) {
+                return std::hypot(x[0] - a, x[1] - b) <= radius;
+              };
+              return is_near(9, 9, 0.3) || is_near(8, 2, 0.3) || is_near(1, 1, 0.4);
+            }));
     EXPECT_NEAR(find_possibility(r, "in"), 2.3 / 7, 1e-3) << seed;
     EXPECT_GE(r.alpha.coverage[0].space_points, 3000) << seed;
     EXPECT_LE(r.alpha.coverage[0].space_points, 5000 + 100) << seed;
@@ -122,31 +124,21 @@ TEST(Study, SpreadsAsMuchWhereConstraintsLeaveLittle) {
 // Inputs that leave nothing to choose from: a study of them ends, also with room for more runs.
 TEST(Study, EndsWhereNothingIsLeftToSpread) {
   const Folder folder;
-  Problem p;
-  p.kind = "small";
-  p.inputs = {{"x0", "", 1}, {"x1", "", 1}};
-  p.space.inputs = {uncertainty::make_triangular(2, 2, 2), uncertainty::make_triangular(3, 3, 3)};
-  p.limit = 20;
+  const auto happens = [](const Point&) { return true; };
   const StudyResult crisp =
-      run(p, make_options(folder / "crisp"), make_sum_factories([](const Point&) { return true; }));
+      run(make_problem({uncertainty::make_triangular(2, 2, 2), uncertainty::make_triangular(3, 3, 3)}, 20),
+          make_options(folder / "crisp"), make_factories(calc_sum, happens));
   EXPECT_EQ(crisp.alpha.archive.size(), 1u);
   EXPECT_EQ(crisp.ending, uncertainty::Ending::Complete);
   EXPECT_EQ(crisp.alpha.outputs[0].levels[0].upper.value, 5);
 
   // x0 + x1 = 3, as two constraints that leave round-off
-  p.space.inputs = {uncertainty::make_triangular(1, 2, 4), uncertainty::make_triangular(0, 1, 2)};
+  Problem p = make_problem({uncertainty::make_triangular(1, 2, 4), uncertainty::make_triangular(0, 1, 2)}, 300);
   const auto calc_excess = [](double a, double b) { return a - b - 1e-12 * std::max(a, b); };
   p.space.constraints = {[=](const Point& x) { return calc_excess(x[0] + x[1], 3); },
                          [=](const Point& x) { return calc_excess(3, x[0] + x[1]); }};
-  p.limit = 300;
   const StudyResult line =
-      run(p, make_options(folder / "line"),
-          RunnerFactories{{"small", [](const std::string&) -> Runner {
-                             return [](auto points, const auto& give, const auto&) {
-                               for (std::size_t i = 0; i < points.size(); ++i)
-                                 give(i, {Answer::Kind::Done, {{"y", points[i][0]}}, "", {}, "", 0});
-                             };
-                           }}});
+      run(p, make_options(folder / "line"), make_factories([](const Point& x) { return x[0]; }, happens));
   EXPECT_NEAR(line.alpha.outputs[0].levels[0].lower.value, 1, 1e-8);
   EXPECT_NEAR(line.alpha.outputs[0].levels[0].upper.value, 3, 1e-8);
 }
