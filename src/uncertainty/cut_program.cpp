@@ -199,11 +199,56 @@ Point CutProgram::pull(const Point& base, Point x) const {
   return bisect(base, std::move(x), [this](const Point& y) { return contains(y); }).first;
 }
 
-/// Adds the half space that supports the cut where the way from its centre to x leaves it. False where there is none
-/// that keeps `base`.
-bool CutProgram::cut_off(const Point& x, const Point& base) {
+/// The half space that supports the cut at an end of it, where it ends in a plane there: by places on that plane beside
+/// the way, which need no slopes of what ties the inputs.
+std::optional<HalfSpace> CutProgram::find_face(const Point& end) const {
+  const std::size_t n = axes_.size();
+  const std::vector<double> at = find_way(centre_, end);
+  const double length = std::sqrt(dot(at, at));
+  if (!(length > 0)) return {};
+  std::vector<double> way = at;
+  for (double& c : way) c /= length;
+  double round_off = 1e-13;
+  for (const int i : axes_) round_off = std::max(round_off, 1e-15 * std::abs(end[i]) / scale_[i]);
+  const auto tangents = find_free_directions({way}, n);
+  for (const double r : {1e-2, 1e-3, 1e-4}) {
+    HalfSpace h{way, 0};
+    bool is_straight = true;
+    for (const auto& t : tangents) {
+      double off[2];
+      for (const int side : {0, 1}) {
+        const auto place = [&](double along) {
+          Point x = end;
+          for (std::size_t k = 0; k < n; ++k)
+            x[axes_[k]] += scale_[axes_[k]] * ((side == 0 ? -r : r) * t[k] + along * way[k]);
+          return x;
+        };
+        double low = -std::min(10 * r, length), high = 10 * r;
+        is_straight = is_straight && contains(place(low)) && !contains(place(high)) && box_.contains(place(high));
+        for (int halving = 0; halving < 60 && is_straight; ++halving)
+          (contains(place(0.5 * (low + high))) ? low : high) = 0.5 * (low + high);
+        off[side] = low;
+      }
+      is_straight = is_straight && std::abs(off[0] + off[1]) < round_off;
+      if (!is_straight) break;
+      for (std::size_t k = 0; k < n; ++k) h.a[k] -= 0.5 * (off[1] - off[0]) / r * t[k];
+    }
+    if (!is_straight) continue;
+    const double size = std::sqrt(dot(h.a, h.a));
+    for (double& a : h.a) a /= size;
+    h.b = dot(h.a, at);
+    return h;
+  }
+  return {};
+}
+
+/// The half space that supports the cut where the way from its centre to x leaves it; the last place inside is kept.
+std::optional<HalfSpace> CutProgram::find_support(const Point& x) {
   const auto [in, out] = bisect(
       centre_, x, [this](const Point& y) { return contains(y); }, 60);
+  inside_.push_back(find_way(centre_, in));
+  if (std::ssize(inside_) > most_planes) inside_.erase(inside_.begin() + 6 * std::ssize(axes_));
+  if (auto face = find_face(in)) return face;
   std::function<double(const Point&)> g;
   for (const auto& c : space_.constraints)
     if (!(c(out) <= 0)) {
@@ -211,7 +256,7 @@ bool CutProgram::cut_off(const Point& x, const Point& base) {
       break;
     }
   if (!g && space_.joint) g = [this](const Point& y) { return alpha_ - space_.joint(y); };
-  if (!g) return false;
+  if (!g) return {};
   const auto calc_slope = [&](int i, double step) {
     Point y = in;
     y[i] = in[i] + step * scale_[i];
@@ -220,18 +265,76 @@ bool CutProgram::cut_off(const Point& x, const Point& base) {
     return (above - g(y)) / (2 * step);
   };
   HalfSpace h;
-  double square = 0;
+  double largest = 0, square = 0;
   for (const int i : axes_) {
-    // near, since there are kinks; but of what is straight for far the round-off is small
-    const double near = calc_slope(i, 1e-7), far = calc_slope(i, 1e-2);
-    h.a.push_back(std::abs(far - near) <= 1e-6 * std::abs(near) + 1e-8 ? far : near);
-    square += h.a.back() * h.a.back();
+    h.a.push_back(calc_slope(i, 1e-7));  // near, since there are kinks
+    largest = std::max(largest, std::abs(h.a.back()));
   }
-  if (!(square > 0) || !std::isfinite(square)) return false;
+  for (std::size_t k = 0; k < h.a.size(); ++k) {
+    // of what is straight for far the round-off is small
+    const double near = h.a[k];
+    for (const double step : {1e-2, 1e-3, 1e-4, 1e-5})
+      if (const double far = calc_slope(axes_[k], step);
+          std::abs(far - near) <= 1e-6 * std::abs(near) + 1e-8 * largest) {
+        h.a[k] = far;
+        break;
+      }
+    square += h.a[k] * h.a[k];
+  }
+  if (!(square > 0) || !std::isfinite(square)) return {};
   for (double& a : h.a) a /= std::sqrt(square);
   h.b = dot(h.a, find_way(centre_, in));
-  if (dot(h.a, find_way(centre_, base)) > h.b + least_width) return false;
-  planes_.push_back(std::move(h));
+  return h;
+}
+
+/// Places where the cut ends along the axes and between them, which no half space that supports it leaves out.
+void CutProgram::look_around() {
+  Random random(1);
+  for (std::size_t turn = 0; turn < 6 * axes_.size(); ++turn) {
+    Point y = centre_;
+    for (std::size_t k = 0; k < axes_.size(); ++k) {
+      const double along = turn / 2 == k ? (turn % 2 == 0 ? -1 : 1) : 0;
+      y[axes_[k]] += scale_[axes_[k]] * (turn < 2 * axes_.size() ? along : random.next(-1, 1));
+    }
+    y = clip(box_, std::move(y));
+    inside_.push_back(
+        find_way(centre_, bisect(centre_, std::move(y), [this](const Point& x) { return contains(x); }).first));
+  }
+}
+
+/// Adds a half space that supports the cut and leaves x out, or one that is a guess. False where there is none that
+/// keeps `base`.
+bool CutProgram::cut_off(const Point& x, const Point& base) {
+  if (inside_.empty()) look_around();
+  const std::vector<double> from = find_way(centre_, base), to = find_way(centre_, x);
+  const auto calc_beyond = [](const HalfSpace& h, const std::vector<double>& v) { return dot(h.a, v) - h.b; };
+  // by its round-off a half space is moved out
+  const auto supports = [&](HalfSpace& h) {
+    double beyond = std::max(0.0, calc_beyond(h, from));
+    for (const auto& v : inside_) beyond = std::max(beyond, calc_beyond(h, v));
+    h.b += beyond;
+    return beyond <= 1e-7 && calc_beyond(h, to) > 0.1 * least_width;
+  };
+  std::optional<HalfSpace> first = find_support(x);
+  if (!first) return false;
+  HalfSpace moved = *first;
+  if (supports(moved)) {
+    planes_.push_back(std::move(moved));
+    return true;
+  }
+  // at an edge slopes tell nothing of either side: there are places of one side alone beside it
+  Random random(1);
+  for (const double part : {1e-6, 1e-6, 1e-5, 1e-5, 1e-4, 1e-4, 1e-3, 1e-3, 1e-2, 1e-2}) {
+    Point y = x;
+    for (const int i : axes_) y[i] += part * random.next(-1, 1) * scale_[i];
+    if (contains(y)) continue;
+    std::optional<HalfSpace> h = find_support(y);
+    if (!h || !supports(*h)) continue;
+    planes_.push_back(std::move(*h));
+    return true;
+  }
+  if (calc_beyond(*first, from) > least_width) return false;
+  planes_.push_back(std::move(*first));
   return true;
 }
 

@@ -2,6 +2,7 @@
 /// Quadratic programmes over cuts, which cost no runs: what ties the inputs is known where it is asked
 /// (docs/theory/uncertainty.md, section 3).
 
+#include <optional>
 #include <vector>
 
 #include "uncertainty/space.h"
@@ -39,6 +40,9 @@ class CutProgram {
   friend Point find_most_possible(const Space&, const std::vector<double>&, const std::vector<int>&, const Point&,
                                   double, const HalfSpace&);
   bool contains(const Point& x) const { return is_in_cut(space_, box_, alpha_, x); }
+  std::optional<HalfSpace> find_support(const Point& x);
+  void look_around();
+  std::optional<HalfSpace> find_face(const Point& end) const;
   bool cut_off(const Point& x, const Point& base);
   std::vector<double> find_way(const Point& from, const Point& to) const;  // by widths
   Point move(const Point& base, const std::vector<double>& v) const;
@@ -52,7 +56,8 @@ class CutProgram {
   std::vector<double> scale_;
   std::vector<int> axes_;
   Point centre_;
-  std::vector<HalfSpace> planes_;  // by widths from the centre
+  std::vector<HalfSpace> planes_;            // by widths from the centre
+  std::vector<std::vector<double>> inside_;  // places of the cut at its edge, as the planes; the latest
 };
 
 /// The place with the largest membership in a half space, which is seen from `base` by widths along the axes, no

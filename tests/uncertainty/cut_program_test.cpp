@@ -96,6 +96,42 @@ TEST(CutProgram, FindsEdgesAndCornersOfACut) {
   EXPECT_NEAR(p[2], p[1] - 0.25, 1e-8);
 }
 
+// Products of hats vanish with their slopes at the edges of their support: |x + y|, |y - 0.5 z|, |z + 0.3 w| and
+// |w - 0.2 x| at most 1, 1, 1 and 1.
+TEST(CutProgram, LeavesACornerWhereAProductOfHatsVanishesWithItsSlopes) {
+  const auto calc_parts = [](const Point& x) {
+    return Point{x[0] + x[1], x[1] - 0.5 * x[2], x[2] + 0.3 * x[3], x[3] - 0.2 * x[0]};
+  };
+  for (const bool is_flat : {false, true}) {
+    Space space;
+    for (int i = 0; i < 4; ++i) space.inputs.push_back(make_triangular(-5, 0, 5));
+    space.joint = [&](const Point& x) {
+      double product = 1;
+      for (const double s : calc_parts(x)) product *= std::max(0.0, 1 - std::abs(s)) * (is_flat ? 1 - s * s : 1);
+      return product;
+    };
+    // parts (1, 1, 1, 1), but for a hair
+    const Point corner = [&] {
+      // y = 1 + z/2, x = 1 - y, w = 1 + x/5, z = 1 - 0.3 w
+      const double z = (1 - 0.3) / (1 - 0.3 * 0.1), y = 1 + 0.5 * z, x = 1 - y;
+      return Point{x, y, z, 1 + 0.2 * x};
+    }();
+    Point base = corner;
+    for (double& c : base) c *= 1 - 1e-11;
+    ASSERT_TRUE(is_in_cut(space, make_box(space, 0), 0, base));
+    CutProgram cut(space, 0, calc_scale(space), {0, 1, 2, 3});
+    const Point rows[] = {{1, 1, 0, 0}, {0, 1, -0.5, 0}, {0, 0, 1, 0.3}, {-0.2, 0, 0, 1}};
+    for (int k = 0; k < 16; ++k) {
+      // least where part j is 1 for the bits of k that are set, -1 for the others
+      Quadratic q{std::vector<double>(4, 0.0), std::vector<double>(16, 0.0)};
+      for (int j = 0; j < 4; ++j)
+        for (int i = 0; i < 4; ++i) q.slope[i] += (k >> j & 1 ? -1 : 1) * rows[j][i];
+      const Point parts = calc_parts(cut.minimise_from(base, q, 1));
+      for (int j = 0; j < 4; ++j) EXPECT_NEAR(parts[j], k >> j & 1 ? 1 : -1, 1e-7) << k << " " << j;
+    }
+  }
+}
+
 TEST(CutProgram, FindsTheMostPossiblePlaceOfAHalfSpace) {
   // x + y/2 - z >= 4: 26/41 with x + y + z <= 17, 11/17 without
   Space space = get_space();
