@@ -401,11 +401,11 @@ Point CutProgram::project_from(const Point& base, const Point& target, double re
   return find_place(base, q, reach, {}, std::vector<double>(n, 0.0));
 }
 
-/// By bisection of the level. Whether the cut at a level reaches the half space within the box is a linear programme,
+/// By bisection of the level. Whether the cut at a level reaches the half spaces within the box is a linear programme,
 /// in which all half spaces may be left by the same least length; those that support the cut are found as they are
 /// needed, and hold for higher levels too.
 Point find_most_possible(const Space& space, const std::vector<double>& scale, const std::vector<int>& axes,
-                         const Point& base, double reach, const HalfSpace& side) {
+                         const Point& base, double reach, const std::vector<HalfSpace>& sides) {
   const std::size_t n = axes.size();
   const auto find_place = [&](CutProgram& cut) -> std::optional<Point> {
     Quadratic q{std::vector<double>(n + 1, 0.0), std::vector<double>((n + 1) * (n + 1), 0.0)};
@@ -417,8 +417,9 @@ Point find_most_possible(const Space& space, const std::vector<double>& scale, c
       upper[k] = std::min(reach, (cut.box_.upper[i] - base[i]) / scale[i]);
       if (!(lower[k] <= upper[k])) return {};
     }
-    if (!space.has_interaction()) {
+    if (!space.has_interaction() && sides.size() == 1) {
       // the box's corner that lies deepest
+      const HalfSpace& side = sides.front();
       std::vector<double> v(n);
       for (std::size_t k = 0; k < n; ++k)
         v[k] = side.a[k] > 0 ? lower[k] : side.a[k] < 0 ? upper[k] : std::clamp(0.0, lower[k], upper[k]);
@@ -429,7 +430,7 @@ Point find_most_possible(const Space& space, const std::vector<double>& scale, c
     for (int round = 0; round < 100; ++round) {
       std::vector<double> v(n + 1, 0.0);
       for (std::size_t k = 0; k < n; ++k) v[k] = std::clamp(0.0, lower[k], upper[k]);
-      std::vector<HalfSpace> rows{side};
+      std::vector<HalfSpace> rows = sides;
       for (const HalfSpace& h : cut.planes_) {
         rows.push_back(h);
         rows.back().b -= dot(h.a, cut.find_way(cut.centre_, base));

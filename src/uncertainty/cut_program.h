@@ -38,7 +38,7 @@ class CutProgram {
 
  private:
   friend Point find_most_possible(const Space&, const std::vector<double>&, const std::vector<int>&, const Point&,
-                                  double, const HalfSpace&);
+                                  double, const std::vector<HalfSpace>&);
   bool contains(const Point& x) const { return is_in_cut(space_, box_, alpha_, x); }
   std::optional<HalfSpace> find_support(const Point& x);
   void look_around();
@@ -60,9 +60,9 @@ class CutProgram {
   std::vector<std::vector<double>> inside_;  // places of the cut at its edge, as the planes; the latest
 };
 
-/// The place with the largest membership in a half space, which is seen from `base` by widths along the axes, no
-/// farther than `reach` from there along any axis. `base` where nothing more possible is found.
+/// The place with the largest membership in all half spaces `sides`, which are seen from `base` by widths along the
+/// axes, no farther than `reach` from there along any axis. `base` where nothing more possible is found.
 Point find_most_possible(const Space&, const std::vector<double>& scale, const std::vector<int>& axes,
-                         const Point& base, double reach, const HalfSpace& side);
+                         const Point& base, double reach, const std::vector<HalfSpace>& sides);
 
 }  // namespace topple::uncertainty

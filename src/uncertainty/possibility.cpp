@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 
+#include "uncertainty/boundary.h"
 #include "uncertainty/cut_program.h"
 #include "uncertainty/linear.h"
 #include "uncertainty/random.h"
@@ -59,6 +60,13 @@ int count_above(const Space& space, const Archive& archive, double possibility) 
                                         [&](const Sample& s) { return calc_membership(space, s.x) > possibility; }));
 }
 
+std::vector<int> find_axes(const Space& space) {
+  std::vector<int> axes;
+  for (int i = 0; i < space.size(); ++i)
+    if (space.inputs[i].width() > 0) axes.push_back(i);
+  return axes;
+}
+
 /// The search for one class; every step names points for the common batch and then reads the archive.
 class Climb {
  public:
@@ -69,9 +77,9 @@ class Climb {
         random_(options.seed + 31 * static_cast<size_t>(outcome + 2)),
         support_(make_box(space, 0)),
         scale_(calc_scale(space)),
-        centre_(calc_centre(space)) {
-    for (int i = 0; i < space.size(); ++i)
-      if (space.inputs[i].width() > 0) axes_.push_back(i);
+        centre_(calc_centre(space)),
+        axes_(find_axes(space)),
+        boundary_(scale_, axes_) {
     if (space.has_interaction()) cut_.emplace(space, 0, scale_, axes_);
   }
 
@@ -122,7 +130,7 @@ class Climb {
           points = ask_wall(archive);
           break;
         case Stage::Lead:
-          points = ask_along_wall();
+          points = ask_along_wall(archive);
           break;
         case Stage::Look:
           points = ask_look();
@@ -151,11 +159,11 @@ class Climb {
         std::vector<bool> inside;
         for (const Point& x : wall_->pending()) inside.push_back(is_ours(archive, x));
         wall_->tell(inside);
-        if (wall_->is_done()) stage_ = Stage::Lead;
+        if (wall_->is_done()) keep_wall(archive);
         break;
       }
       case Stage::Lead:
-        learn(best_ - before, best_x_ != from);
+        learn(archive, best_ - before, best_x_ != from);
         break;
       case Stage::Look:
         if (best_ > before || (sample_ >= 0 && !had_sample)) {
@@ -226,59 +234,91 @@ class Climb {
     resolution_ = bracket_.in - bracket_.out;
     stage_ = axes_.size() < 2 || sample_ < 0 || walled_ == best_ ? Stage::Look : Stage::Wall;
     reach_ = largest_reach / 2, promised_ = 1, leads_ = 0, walled_from_ = best_;
-    wall_.reset();
+    wall_.reset(), boundary_.clear(), tried_.clear(), turns_ = 0;
   }
 
-  /// The boundary of the class near the best place as a plane, seen from the nearest run of another class above.
+  Boundary::Places find_places(const Archive& archive, bool ours) const {
+    Boundary::Places places;
+    for (const Sample& s : archive.samples())
+      if ((outcome_of(s.result) == outcome_) == ours && boundary_.calc_offset(s.x, best_x_) < 3 * reach_ &&
+          (!ours || calc_membership(space_, s.x) > 0))
+        places.push_back(&s.x);
+    return places;
+  }
+
+  void keep_wall(const Archive& archive) {
+    stage_ = Stage::Lead;
+    // it was another plane that stopped it
+    if (boundary_.keep(*wall_, best_x_, reach_, find_places(archive, true))) reach_ = largest_reach / 2;
+  }
+
+  /// The nearest run of another class above, where there is one that no plane explains.
+  std::pair<int, bool> find_beyond(const Archive& archive) const {
+    int nearest = -1;
+    double least = 0;
+    bool is_explained = true;
+    for (int at = 0; at < static_cast<int>(archive.size()); ++at) {
+      const Sample& s = archive[at];
+      if (outcome_of(s.result) == outcome_ || !(calc_membership(space_, s.x) > best_)) continue;
+      if (std::find(tried_.begin(), tried_.end(), at) != tried_.end()) continue;
+      const double distance = boundary_.calc_offset(s.x, best_x_);
+      const bool lies_beyond = distance > 2 * reach_ || boundary_.explains(s.x);
+      if (nearest < 0 || (lies_beyond == is_explained ? distance < least : !lies_beyond))
+        least = distance, nearest = at, is_explained = lies_beyond;
+    }
+    return {nearest, is_explained};
+  }
+
+  /// The boundary of the class near the best place as a plane.
   std::vector<Point> ask_wall(const Archive& archive) {
     if (!wall_) {
-      const Sample* nearest = nullptr;
-      double least = 0;
-      for (const Sample& s : archive.samples()) {
-        if (outcome_of(s.result) == outcome_ || !(calc_membership(space_, s.x) > best_)) continue;
-        double distance = 0;
-        for (const int i : axes_) distance = std::max(distance, std::abs(s.x[i] - best_x_[i]) / scale_[i]);
-        if (nearest == nullptr || distance < least) least = distance, nearest = &s;
-      }
+      const auto [nearest, is_explained] = find_beyond(archive);
       const bool promises_nothing = reach_ < 0.004 && promised_ < 0.1 * options_.tolerance;
-      if (nearest == nullptr || promises_nothing || reach_ < smallest_reach || leads_++ >= most_leads) {
+      if (nearest < 0 || promises_nothing || reach_ < smallest_reach || leads_++ >= most_leads) {
         stage_ = best_ > walled_from_ + options_.tolerance ? Stage::Start : Stage::Look;
         walled_ = best_;
         return {};
       }
+      tried_.push_back(nearest);
       WallProbe::Project project;
       if (cut_)
         project = [this](const Point& from, const Point& to) { return cut_->project_from(from, to, 10 * reach_); };
+      const bool has_edges = boundary_.has_edges();
+      const Point inside =
+          has_edges ? boundary_.find_inner(best_x_, reach_, find_places(archive, true), find_places(archive, false))
+                    : best_x_;
       wall_.emplace(
-          support_, scale_, axes_, best_x_, nearest->x, reach_,
-          [this](const Point& x) { return calc_membership(space_, x) > 0; }, std::move(project));
-      if (wall_->is_done()) stage_ = Stage::Lead;
+          support_, scale_, axes_, inside, archive[nearest].x, reach_,
+          [this](const Point& x) { return calc_membership(space_, x) > 0; }, std::move(project), has_edges ? 4 : 0);
+      if (wall_->is_done()) keep_wall(archive);
     }
     return wall_->pending();
   }
 
   /// What is most possible on this side of the plane, and a little farther inside: a class may bend away.
-  std::vector<Point> ask_along_wall() {
+  std::vector<Point> ask_along_wall(const Archive& archive) {
     std::vector<Point> points;
     promised_ = 0;
     if (wall_->found()) {
-      HalfSpace side{wall_->normal(), 0};
-      const double distance = wall_->calc_distance(best_x_);
-      for (const double part : {0.0, 0.01, 0.03, 0.1, 0.3}) {
-        side.b = distance - part * reach_;
-        Point x = find_most_possible(space_, scale_, axes_, best_x_, 2 * reach_, side);
-        if (part == 0) promised_ = calc_membership(space_, x) - best_;
-        const bool is_flat = cut_ && !(promised_ > 0);
-        if (is_flat) x = find_nearest_to_centre(side);
-        for (const double way : {1.0, 0.5, 0.25}) {
-          Point y = best_x_;
-          for (const int i : axes_) y[i] += way * (x[i] - best_x_[i]);
-          const double mu = calc_membership(space_, y);
-          if (is_flat ? mu >= best_ : mu > best_) add(points, clip(support_, std::move(y)));
+      // all planes; the latest alone, since a class may not be convex
+      for (const bool latest : boundary_.size() > 1 ? std::vector<bool>{false, true} : std::vector<bool>{true}) {
+        for (const double part : {0.0, 0.01, 0.03, 0.1, 0.3}) {
+          const std::vector<HalfSpace> sides =
+              latest ? boundary_.see_latest(best_x_, part * reach_) : boundary_.see(best_x_, part * reach_);
+          Point x = find_most_possible(space_, scale_, axes_, best_x_, 2 * reach_, sides);
+          if (part == 0 && !(latest && boundary_.size() > 1)) promised_ = calc_membership(space_, x) - best_;
+          const bool is_flat = cut_ && !(promised_ > 0);
+          if (is_flat) x = find_nearest_to_centre(sides.back());
+          for (const double way : {1.0, 0.5, 0.25}) {
+            Point y = best_x_;
+            for (const int i : axes_) y[i] += way * (x[i] - best_x_[i]);
+            const double mu = calc_membership(space_, y);
+            if (is_flat ? mu >= best_ : mu > best_) add(points, clip(support_, std::move(y)));
+          }
         }
       }
     }
-    if (points.empty()) learn(0, false);
+    if (points.empty()) learn(archive, 0, false);
     return points;
   }
 
@@ -302,9 +342,14 @@ class Climb {
   }
 
   /// Goes on farther or nearer, by what has come of what the plane promised.
-  void learn(double gained, bool moved) {
+  void learn(const Archive& archive, double gained, bool moved) {
     const double part = promised_ > 0 ? gained / promised_ : moved ? 1 : 0;
-    reach_ = std::min(largest_reach, reach_ * (part > 0.5 ? 1.2 : part > 0.2 ? 0.5 : 0.25));
+    // what stopped it may be another plane
+    const bool is_new =
+        part <= 0.5 && boundary_.has_edges() && turns_ < std::ssize(axes_) && !find_beyond(archive).second;
+    turns_ = is_new ? turns_ + 1 : 0;
+    if (moved || !is_new) tried_.clear();
+    if (!is_new) reach_ = std::min(largest_reach, reach_ * (part > 0.5 ? 1.2 : part > 0.2 ? 0.5 : 0.25));
     wall_.reset();
     stage_ = Stage::Wall;
   }
@@ -412,11 +457,13 @@ class Climb {
   bool converged_ = false;
   std::optional<CutProgram> cut_;  // the support, with interaction
   std::optional<WallProbe> wall_;
+  Boundary boundary_;       // near the best place
+  std::vector<int> tried_;  // runs from which planes were looked for, since it moved
   static constexpr double largest_reach = 0.2, smallest_reach = 1e-4;  // of a plane, by widths
   static constexpr int most_leads = 30;
   double reach_ = 0, promised_ = 0;
   double walled_ = -1, walled_from_ = 0;  // possibility at which walls have led no further; at which they began
-  int leads_ = 0;
+  int leads_ = 0, turns_ = 0;             // turns: leads in a row that met another plane
 };
 
 }  // namespace

@@ -14,7 +14,7 @@ constexpr int sections = 2, rounds = 8;
 }  // namespace
 
 WallProbe::WallProbe(const Box& box, std::vector<double> scale, std::vector<int> axes, Point inside, Point outside,
-                     double radius, Allow allow, Project project)
+                     double radius, Allow allow, Project project, int most_nearer)
     : box_(box),
       scale_(std::move(scale)),
       axes_(std::move(axes)),
@@ -22,7 +22,8 @@ WallProbe::WallProbe(const Box& box, std::vector<double> scale, std::vector<int>
       outside_(std::move(outside)),
       radius_(radius),
       allow_(std::move(allow)),
-      project_(std::move(project)) {
+      project_(std::move(project)),
+      most_nearer_(most_nearer) {
   double length = 0;
   for (const int i : axes_) {
     direction_.push_back((outside_[i] - anchor_[i]) / scale_[i]);
@@ -110,6 +111,41 @@ void WallProbe::tell(const std::vector<bool>& is_inside) {
       if (!r.crosses && r.axis >= 0 && !r.is_mirrored) r = make_ray(r.axis, true);
     ask_sections();
   }
+  if (!pending_.empty()) return;
+  fit();
+  if (is_bent()) ask_nearer();
+}
+
+/// Whether the crossings miss the plane by more than they are known: there is an edge between them, or they are too
+/// far from each other for a tangent.
+bool WallProbe::is_bent() const {
+  if (!found() || nearer_ >= most_nearer_ || !rays_.front().crosses) return false;
+  return std::any_of(rays_.begin(), rays_.end(), [this](const Ray& r) {
+    if (!r.crosses) return false;
+    double square = 0;
+    for (const int i : axes_) square += std::pow((r.to[i] - anchor_[i]) / scale_[i], 2);
+    return std::abs(calc_distance(blend(r.to, 0.5 * (r.in + r.out)))) > 1.5 * std::sqrt(square) * (r.out - r.in);
+  });
+}
+
+/// The same around the crossing of the ray that was not turned.
+void WallProbe::ask_nearer() {
+  ++nearer_;
+  const Ray middle = rays_.front();
+  double length = 0;
+  for (std::size_t k = 0; k < axes_.size(); ++k) {
+    direction_[k] = (middle.to[axes_[k]] - anchor_[axes_[k]]) / scale_[axes_[k]];
+    length += direction_[k] * direction_[k];
+  }
+  length = std::sqrt(length);
+  for (double& d : direction_) d /= length;
+  radius_ *= 0.125;
+  outside_ = blend(middle.to, middle.out);
+  anchor_ = blend(middle.to, std::max(0.0, middle.in - radius_ / length));
+  normal_.clear();
+  rays_.clear();
+  for (int axis = -1; axis < static_cast<int>(axes_.size()); ++axis) rays_.push_back(make_ray(axis, false));
+  ask_sections();
   if (pending_.empty()) fit();
 }
 

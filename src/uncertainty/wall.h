@@ -18,9 +18,10 @@ class WallProbe {
   /// The place that counts and is nearest to `to`, seen from a place that counts; empty: on the way there.
   using Project = std::function<Point(const Point& from, const Point& to)>;
   /// `inside` and `outside` are known; lengths are measured in parts of `scale`, one per input; `axes` may vary. Rays
-  /// end where points no longer count.
+  /// end where points no longer count. Where what is found is no plane, they are drawn together by 8 times, so many
+  /// times at most.
   WallProbe(const Box& box, std::vector<double> scale, std::vector<int> axes, Point inside, Point outside,
-            double radius, Allow allow = {}, Project project = {});
+            double radius, Allow allow = {}, Project project = {}, int most_nearer = 0);
   const std::vector<Point>& pending() const { return pending_; }
   void tell(const std::vector<bool>& is_inside);
   bool is_done() const { return pending_.empty(); }
@@ -28,6 +29,8 @@ class WallProbe {
   bool found() const { return !normal_.empty(); }
   /// Unit vector out of the inside, one per axis.
   const std::vector<double>& normal() const { return normal_; }
+  /// Of the places it was found by, as the one that was given or smaller.
+  double radius() const { return radius_; }
   /// Distance of a point from the plane, positive inside.
   double calc_distance(const Point&) const;
 
@@ -44,6 +47,8 @@ class WallProbe {
   Point blend(const Point& to, double t) const;
   Ray make_ray(int axis, bool is_mirrored) const;
   void ask_sections();
+  bool is_bent() const;
+  void ask_nearer();
   void fit();
 
   Box box_;
@@ -59,6 +64,7 @@ class WallProbe {
   std::vector<double> normal_;
   double offset_ = 0;
   bool has_anchor_ = false;
+  int most_nearer_, nearer_ = 0;  // times that the places were drawn together
 };
 
 }  // namespace topple::uncertainty

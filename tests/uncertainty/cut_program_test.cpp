@@ -137,16 +137,16 @@ TEST(CutProgram, FindsTheMostPossiblePlaceOfAHalfSpace) {
   Space space = get_space();
   const Point base{6, 8, 6};
   const HalfSpace side = make_half_space({-1, -0.5, 1}, (6 + 4 - 6 - 4) / 10.0);
-  const Point x = find_most_possible(space, calc_scale(space), {0, 1, 2}, base, 1, side);
+  const Point x = find_most_possible(space, calc_scale(space), {0, 1, 2}, base, 1, {side});
   EXPECT_NEAR(calc_membership(space, x), 11.0 / 17, 1e-6);
   EXPECT_GE(x[0] + 0.5 * x[1] - x[2], 4 - 1e-9);
   space.constraints.push_back([](const Point& p) { return p[0] + p[1] + p[2] - 17; });
   const Point y = find_most_possible(space, calc_scale(space), {0, 1, 2}, {5, 6, 4}, 1,
-                                     make_half_space({-1, -0.5, 1}, (5 + 3 - 4 - 4) / 10.0));
+                                     {make_half_space({-1, -0.5, 1}, (5 + 3 - 4 - 4) / 10.0)});
   EXPECT_NEAR(calc_membership(space, y), 26.0 / 41, 1e-6);
   space.constraints.clear();
   space.joint = nullptr;
-  const Point z = find_most_possible(space, calc_scale(space), {0, 1, 2}, base, 1, side);
+  const Point z = find_most_possible(space, calc_scale(space), {0, 1, 2}, base, 1, {side});
   EXPECT_NEAR(calc_membership(space, z), 11.0 / 14, 1e-6) << "3 + 7t + 3 + 2t - 5 + 5t = 4";
 }
 
