@@ -20,7 +20,7 @@ std::string make_outline_table(const record::Record& r) {
   if (r.time.empty()) return out;
   for (const double share : {0.5, 0.9, 0.95, 1.0})
     for (const Point2& p : calc_share_outline(r, r.time.size() - 1, share))
-      out += fmt::format("{},{},{}\r\n", share, p[0], p[1]);
+      out += fmt::format("{},{},{}\r\n", share, p[0] + 0.0, p[1] + 0.0);
   return out;
 }
 

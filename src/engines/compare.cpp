@@ -154,8 +154,9 @@ std::string to_csv(const mbs::Model& model, const Comparison& c) {
   };
   for (const EngineRun& r : c.runs)
     for (size_t i = 0; i < r.time.size(); ++i)
-      out += fmt::format("{},{},{},{},{},{},{}\r\n", r.name, r.time[i], r.position_at[i], name_of(r.position_body[i]),
-                         r.orientation_at[i], name_of(r.orientation_body[i]), r.height_at[i]);
+      out += fmt::format("{},{},{},{},{},{},{}\r\n", r.name, r.time[i], r.position_at[i] + 0.0,
+                         name_of(r.position_body[i]), r.orientation_at[i] + 0.0, name_of(r.orientation_body[i]),
+                         r.height_at[i] + 0.0);
   return out;
 }
 

@@ -26,10 +26,10 @@ std::string quote_csv(std::string_view text) {
 
 namespace {
 
-/// The shortest digits that give the same number back; not a number is an empty field.
+/// The shortest digits that give the same number back, without -0; not a number is an empty field.
 template <class Number>
 std::string digits(Number value) {
-  return std::isnan(value) ? std::string() : fmt::format("{}", value);
+  return std::isnan(value) ? std::string() : fmt::format("{}", value + Number{0});
 }
 
 std::string with_unit(const std::string& name, const std::string& unit) {

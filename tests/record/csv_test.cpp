@@ -129,7 +129,7 @@ TEST_F(Csv, FindingsNameTheirStatusAndLeaveNoNumberEmpty) {
 TEST_F(Csv, EachOutputIsATableOfItsOwn) {
   write_output_csv(make_sample(), folder_ / "run");
   EXPECT_EQ(read_file(folder_ / "run/outputs/reaction [top].csv"),
-            "time [s],x [N],y [N],z [N]\r\n0,1,-0,\r\n0.25,inf,5,6\r\n");
+            "time [s],x [N],y [N],z [N]\r\n0,1,0,\r\n0.25,inf,5,6\r\n");
   EXPECT_EQ(read_file(folder_ / "run/outputs/empty.csv"), "time [s],force [N]\r\n");
   EXPECT_EQ(read_file(folder_ / "run/outputs/tilt.csv"), "time [s],w [1],x [1],y [1],z [1]\r\n0,1,0,0,0\r\n");
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "run/outputs"), {}), 4);
