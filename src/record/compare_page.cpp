@@ -125,6 +125,9 @@ std::vector<Photo> read_photos(const std::string& path) {
                     encode_base64(std::span(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size())));
     photos.push_back(std::move(photo));
   }
+  if (photos.empty())
+    throw InputError("E681", path + ": the table names no picture",
+                     "a line is a time in seconds, a comma and a file: 1.25,frame-031.jpg");
   return photos;
 }
 
