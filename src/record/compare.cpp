@@ -147,6 +147,9 @@ std::pair<std::string, std::string> tell_files_apart(const std::string& a, const
 Comparison compare(const Record& a, const Record& b, const std::string& path_a, const std::string& path_b) {
   Comparison c;
   name_both(a, b, path_a, path_b, c);
+  c.title_a = a.provenance.title, c.title_b = b.provenance.title;
+  if (c.title_a != c.title_b)
+    c.note = fmt::format("A is of \"{}\", B of \"{}\": see that both are of one building.", c.title_a, c.title_b);
   if (!a.time.empty() && !b.time.empty())
     for (const double t : a.time)
       if (t >= b.time.front() && t <= b.time.back()) c.time.push_back(t);
@@ -269,6 +272,7 @@ std::string describe(const Comparison& c, const Record& a, const Record& b) {
   const auto line = [&out](const std::string& text) { out += text + "\n"; };
   line(fmt::format("A  {}: {}, {} frames to {:.2f} s", c.name_a, a.provenance.title, a.time.size(), a.time.back()));
   line(fmt::format("B  {}: {}, {} frames to {:.2f} s", c.name_b, b.provenance.title, b.time.size(), b.time.back()));
+  if (!c.note.empty()) line(c.note);
   line(c.points);
   line("");
   for (const std::string& sentence : summarise(c)) line(sentence);
@@ -311,7 +315,7 @@ std::string to_csv(const Comparison& c, const Record& a) {
   for (const SeriesPair& s : c.series)
     for (const char* of : {"A", "B", "B - A"}) out += "," + quote_csv(fmt::format("{} {} [{}]", s.id, of, s.unit));
   out += ",distance rms [m],distance largest [m],farthest,distance of mass centres [m]\r\n";
-  const auto field = [](double v) { return std::isfinite(v) ? fmt::format(",{}", v) : std::string(","); };
+  const auto field = [](double v) { return std::isfinite(v) ? fmt::format(",{}", v + 0.0) : std::string(","); };
   for (size_t i = 0; i < c.time.size(); ++i) {
     out += fmt::format("{}", c.time[i]);
     for (const SeriesPair& s : c.series) out += field(s.a[i]) + field(s.b[i]) + field(s.b[i] - s.a[i]);
@@ -327,6 +331,8 @@ std::string to_json(const Comparison& c, const Record& a) {
   j["format"] = "topple-comparison";
   j["version"] = 1;
   j["names"] = {c.name_a, c.name_b};
+  j["titles"] = {c.title_a, c.title_b};
+  j["note"] = c.note.empty() ? json(nullptr) : json(c.note);
   j["points"] = c.points;
   j["matched"] = c.matched;
   j["touchdown"] = {number(c.touchdown_a), number(c.touchdown_b)};

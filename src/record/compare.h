@@ -24,6 +24,8 @@ struct TouchdownPair {
 struct Comparison {
   // what moved the building: "native", "finite elements"; where both are alike with what tells their files apart
   std::string name_a, name_b;
+  std::string title_a, title_b;
+  std::string note;          // a sentence: that they are told apart by their titles; empty: they are not
   std::vector<double> time;  // frames of A within the time that both have [s]       (T)
   // with three bodies in common also "lean_compared", the angle from the vertical of all of them by least squares
   std::vector<SeriesPair> series;

@@ -269,6 +269,7 @@ records)
   sed 's/^title = .*/title = "Another"/' "$plan" >another.toml
   expect 3 "$topple" run another.toml -o other --no-report --duration "0.1 s"
   expect 0 "$topple" compare r/record.h5 other/record.h5 -o c; has err 'other/record.h5 is of "Another"'; has err "of one building"
+  for f in compare.txt compare.json; do has c/$f Another; has c/$f "of one building"; done
   printf '0.5,missing.png\n' >photos.csv
   expect 2 "$topple" compare r/record.h5 r/record.h5 -o none --photos photos.csv; has err "photos.csv:1:5: error E681"
   expect 2 "$topple" compare r/record.h5 missing.h5 -o none; expect 2 "$topple" compare r/record.h5 -o none

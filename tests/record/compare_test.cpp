@@ -208,6 +208,26 @@ TEST(Compare, NamesRecordsOfOneEngineByTheirFiles) {
   EXPECT_EQ(compare(a, other, "left/record.h5", "right/record.h5").name_b, "finite elements");
 }
 
+TEST(Compare, SaysThatTitlesDifferWhereItIsRead) {
+  const Record a = make_run("a", 0.25, 3, 1, 0, 1);
+  Record b = make_run("b", 0.25, 3, 1, 0.5, 1);
+  EXPECT_TRUE(nlohmann::json::parse(to_json(compare(a, b), a))["note"].is_null());
+  EXPECT_EQ(describe(compare(a, b), a, b).find("one building"), std::string::npos);
+  b.provenance.title = "Another";
+  const std::string note = "A is of \"House\", B of \"Another\": see that both are of one building.";
+  const Comparison c = compare(a, b);
+  EXPECT_THAT(describe(c, a, b), HasSubstr("\n" + note + "\n"));
+  const auto j = nlohmann::json::parse(to_json(c, a));
+  EXPECT_EQ(j["note"], note);
+  EXPECT_EQ(j["titles"], (nlohmann::json{"House", "Another"}));
+}
+
+TEST(Compare, WritesNoMinusZero) {
+  Record a = make_run("a", 0.25, 3, 1, 0, 1), b = make_run("b", 0.25, 3, 1, 0, 1);
+  a.series[0].value[0] = b.series[0].value[0] = -0.0;
+  EXPECT_THAT(to_csv(compare(a, b), a), HasSubstr("\r\n0,0,0,0,0,0,,0\r\n"));
+}
+
 TEST(Compare, TellsNoTiltOfABlockThatHasBrokenUp) {
   Record a = make_run("a", 0.25, 5, 1, 0, 1), b = make_run("b", 0.25, 5, 1, 0, 0.9);
   a.series.push_back({"connected_share", "", "1", "", {1, 1, 1, 0.5, 0.4}});
@@ -265,6 +285,15 @@ TEST_F(Photos, ThatAreWrongAreRefusedWithTheirLine) {
       EXPECT_EQ(e.diagnostics()[0].code, "E681");
       EXPECT_EQ(e.diagnostics()[0].where.line, 2) << line;
     }
+  }
+}
+
+TEST_F(Photos, OfATableWithoutOneAreRefused) {
+  for (const char* text : {"", "time,file\n", "# none\n\n"}) {
+    try {
+      (void)read_photos(write("table.csv", text));
+      ADD_FAILURE() << text;
+    } catch (const InputError& e) { EXPECT_THAT(e.diagnostics()[0].message, HasSubstr("names no picture")) << text; }
   }
 }
 

@@ -195,17 +195,26 @@ function Touchdowns(props: { state: State; comparison: Comparison }) {
   );
 }
 
+/// One title of both runs, or two where they differ.
+function headingsOf(compared: Compared): string[] {
+  const [a, b] = [compared.a, compared.b].map((run) => run.provenance.title);
+  return a === b ? [a || "Comparison"] : [a || "no title", b || "no title"];
+}
+
 function Page(props: { state: State; compared: Compared; fitRef: { current: () => void } }) {
   const { state, compared, fitRef } = props;
   const { titles, notes } = compared.plotted;
-  const { names } = compared.comparison;
+  const { names, note } = compared.comparison;
+  const headings = headingsOf(compared);
+  const ofRun = (k: 0 | 1): string => (headings.length === 2 ? `${headings[k]}, ${names[k]}` : names[k]);
   return (
     <>
       <header class="header">
         <div class="title-row">
-          <h1>{compared.a.provenance.title || "Comparison"}</h1>
-          <p class="subtitle">A: {names[0]} · B: {names[1]}</p>
+          <h1>{headings.join(" | ")}</h1>
+          <p class="subtitle">A: {ofRun(0)} · B: {ofRun(1)}</p>
         </div>
+        {note && <p class="verdict warning" data-test="note">{note}</p>}
       </header>
       <main class="layout">
         <div class="stage">
@@ -225,7 +234,7 @@ function Page(props: { state: State; compared: Compared; fitRef: { current: () =
 }
 
 startPage("comparison", readComparison, (compared) => {
-  document.title = `${compared.a.provenance.title || "Runs"} – topple compare`;
+  document.title = `${headingsOf(compared).join(" | ")} – topple compare`;
   const { run } = compared.plotted;
   const state = makeState(run);
   const fitRef = { current: (): void => undefined };

@@ -13,6 +13,7 @@ export interface ComparedSeries {
 }
 export interface Comparison {
   names: [string, string];
+  note?: string | null; // that the titles differ
   points: string;
   matched: number;
   touchdown: [number | null, number | null]; // [s]

@@ -150,6 +150,25 @@ describe("the page of two runs", () => {
   it("runs without an error and without asking for anything else", () => assert.deepEqual(browser.problems, []));
 });
 
+describe("runs of two titles", () => {
+  it("are told apart at the head of their page", async () => {
+    await mkdir(out, { recursive: true });
+    const bundle = await readFile(new URL("../dist/compare.html", import.meta.url), "utf8");
+    const path = `${out}titles.html`, compared = makeCompared();
+    compared.a.provenance.title = "House";
+    compared.b.provenance.title = "Another";
+    compared.comparison.note = 'A is of "House", B of "Another": see that both are of one building.';
+    await writeFile(path, bundle.replace("<!--TOPPLE-DATA-->", () => `<script type="application/json" id="topple-data">${JSON.stringify(compared).replaceAll("<", "\\u003c")}</script>`));
+    const browser = await openPage(path);
+    assert.equal(await browser.page.textContent("h1"), "House | Another");
+    assert.equal(await browser.page.textContent(".subtitle"), "A: House, native · B: Another, finite elements");
+    assert.equal(await browser.page.textContent("[data-test=note]"), compared.comparison.note);
+    assert.equal(await browser.page.title(), "House | Another – topple compare");
+    await browser.page.screenshot({ path: `${out}titles.png` });
+    await browser.close();
+  });
+});
+
 describe("data that are no comparison", () => {
   it("are said to be so", async () => {
     await mkdir(out, { recursive: true });
