@@ -235,7 +235,7 @@ std::string LiveModel::set_delay(const Edit& e, double time) {
   int moved = 0;
   for (LiveCharge& c : charges_) {
     if (c.stage != e.stage || c.is_removed || is_past(c.time, time)) continue;
-    c.time = std::max(t, t + (c.time - stage.time));
+    if (t != stage.time) c.time = std::max(t, t + (c.time - stage.time));
     ++moved;
   }
   if (moved == 0) throw InputError("E931", stage.name + " has fired already", "rewind to a time before that");

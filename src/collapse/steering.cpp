@@ -28,6 +28,17 @@ bool changes_start(const Edit& e, const mbs::Moment& moment, const mbs::Model& m
   return !moment.fired.empty() || std::any_of(model.events.begin(), model.events.end(), is_due);
 }
 
+/// Whether it sets what is there already, so that the run goes on with the bits that it would have had.
+bool changes_nothing(const Edit& e, const LiveModel& before, const LiveModel& after) {
+  if (e.kind == Edit::Kind::SetFriction) {
+    const mbs::Contact &a = before.model().contact, &b = after.model().contact;
+    return a.friction == b.friction && a.body_friction == b.body_friction;
+  }
+  if (e.kind != Edit::Kind::SetDelay) return false;
+  return std::equal(before.charges().begin(), before.charges().end(), after.charges().begin(),
+                    [](const LiveCharge& a, const LiveCharge& b) { return a.time == b.time; });
+}
+
 }  // namespace
 
 size_t Branch::frames() const {
@@ -268,7 +279,8 @@ Steering::Made Steering::edit(const Edit& e, const std::string& name, bool in_pl
     const std::vector<LiveModel::Applied>& applied = run->model().applied();
     for (size_t i = 0; i + 1 < applied.size(); ++i) tell_edit(applied[i].edit, applied[i].text, applied[i].time, *run);
   } else {
-    run = std::make_shared<LiveRun>(std::move(model), options_.run, options_.moment_interval, moment, true,
+    const bool is_successor = !changes_nothing(e, last.run->model(), *model);
+    run = std::make_shared<LiveRun>(std::move(model), options_.run, options_.moment_interval, moment, is_successor,
                                     last.run->recorder());
   }
   const EditEntry entry{e, made.text, made.time, !stays, from.id, base};

@@ -100,6 +100,7 @@ void go_on(const Moment& m, System& s, bool is_successor) {
   s.noted_pairs = m.noted_pairs;
   if (!is_successor) return;
 
+  bool is_other_stiffness = false;
   // a new cable is cut to length where its ends are now; what it stores comes from outside
   for (size_t i = s.state.cable.size(); i < compiled_cables; ++i) {
     const Cable& k = s.model.cables[i];
@@ -107,20 +108,24 @@ void go_on(const Moment& m, System& s, bool is_successor) {
     c.rest_length = norm(place_of(s, k.b, k.p_B) - place_of(s, k.a, k.p_A)) - k.pretension / k.stiffness;
     s.state.removed -= 0.5 * k.pretension * k.pretension / k.stiffness;
     s.state.cable.push_back(c);
+    is_other_stiffness = true;
   }
   const std::vector<int> laws = laws_of(s);
   for (size_t e = 0; e < s.elements.size(); ++e) {
     if (laws[2 * e] == m.laws[2 * e] && laws[2 * e + 1] == m.laws[2 * e + 1]) continue;
     forget_law(s.state.element[e]);
     s.pack_element(e);
+    is_other_stiffness = true;
   }
   for (size_t r = 0; r < s.rotationals.size(); ++r) {
     const size_t at = 2 * (s.elements.size() + r);
-    if (laws[at] != m.laws[at]) forget_law(s.state.rotational[r]);
+    if (laws[at] == m.laws[at] && laws[at + 1] == m.laws[at + 1]) continue;
+    forget_law(s.state.rotational[r]);
+    is_other_stiffness = true;
   }
   s.lanes->share_constants();
-  // the next step looks whether it must be shorter
-  s.state.review_times.push_back(s.state.time);
+  // the next step looks whether it must be shorter; without need it stays, and with it the course of the debris
+  if (is_other_stiffness) s.state.review_times.push_back(s.state.time);
   s.state.quiet_steps = 0;
 }
 

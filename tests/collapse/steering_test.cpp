@@ -141,6 +141,47 @@ TEST(SteeringReplay, SwitchingToAndFroChangesNothing) {
   expect_same_motion(straight.make_record(straight.active()), s.make_record(s.active()));
 }
 
+Edit friction_of(double ground, double bodies) {
+  Edit e;
+  e.kind = Edit::Kind::SetFriction;
+  e.ground = ground, e.bodies = bodies;
+  return e;
+}
+
+TEST(SteeringReplay, AnEditThatSetsWhatIsThereGivesTheBitsOfItsParent) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  advance_until(s, 10);
+  const record::Record whole = s.make_record(s.active());
+  const mbs::Contact& contact = s.active().run().model().model().contact;
+  for (const Edit& edit : {friction_of(contact.friction, contact.body_friction), delay_of_stage(1, 0.6)}) {
+    s.switch_to(1);
+    s.rewind(0.47);
+    s.edit(edit);
+    advance_until(s, 10);
+    expect_same_motion(whole, s.make_record(s.active()));
+  }
+}
+
+TEST(SteeringReplay, EditsThatLeaveTheStiffnessAloneKeepTheSteps) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  advance_until(s, 10);
+  const std::vector<double> times = s.make_record(s.active()).time;
+  const std::vector<long> steps = s.active().run().frame_steps();
+  for (const Edit& edit : {friction_of(0.3, 0.2), delay_of_stage(1, 0.9)}) {
+    s.switch_to(1);
+    s.rewind(0.3);
+    s.edit(edit);
+    advance_until(s, 0.59);
+    const record::Record r = s.make_record(s.active());
+    ASSERT_GT(r.time.back(), 0.55);
+    for (size_t i = 0; i + 1 < r.time.size(); ++i) EXPECT_EQ(r.time[i], times[i]) << i;
+    const std::vector<long>& own = s.active().run().frame_steps();
+    for (size_t i = 0; i < own.size(); ++i) EXPECT_EQ(own[i], steps[s.active().first_frame + i]) << i;
+  }
+}
+
 TEST(SteeringReplay, ThePastTakesAnEditAsTheFrontierDid) {
   Steering late(default_knowledge(), options()), early(default_knowledge(), options());
   for (Steering* s : {&late, &early}) ASSERT_TRUE(s->begin(s->add_root(two_stages(), "main")));
