@@ -300,8 +300,9 @@ void Session::publish_state(bool is_due) {
       rate_time_ = time;
       rate_start_ = Clock::now();
     }
-    s["real_time_factor"] = rate_;
-    s["eta"] = rate_ > 0 ? Json((duration - time) / rate_) : Json(nullptr);
+    const bool has_rate = phase_ == Phase::Running && rate_ > 0;
+    s["real_time_factor"] = has_rate ? Json(rate_) : Json(nullptr);
+    s["eta"] = has_rate ? Json(std::max(0.0, duration - time) / rate_) : Json(nullptr);
     s["ending"] = nullptr;
     if (b.run().has_ended()) s["ending"] = describe_branch(core, b, "")["ending"];
   } else {
@@ -310,6 +311,7 @@ void Session::publish_state(bool is_due) {
     s["ending"] = nullptr;
   }
   if (!failure_.empty()) s["ending"] = {{"kind", failure_kind_}, {"text", failure_}};
+  if (!failure_.empty() && !failure_code_.empty()) s["ending"]["code"] = failure_code_;
   s["speed"] = speed_ ? Json(*speed_) : Json(nullptr);
   s["progress"] = progress_ ? Json(*progress_) : Json(nullptr);
   last_state_ = Clock::now();
@@ -471,7 +473,18 @@ void Session::settle_phase() {
   if (s.ending != Ending::NoEquilibrium && s.ending != Ending::Diverged) return;
   phase_ = Phase::Failed;
   failure_kind_ = s.ending == Ending::Diverged ? "diverged" : "no_equilibrium";
+  failure_code_.clear();
   failure_ = s.message;
+}
+
+void Session::fail_to_build(const char* kind, const InputError& why) {
+  steering_.reset();
+  phase_ = Phase::Failed;
+  failure_kind_ = kind;
+  failure_code_ = why.first_error().code;
+  failure_ = why.first_error().message;
+  diagnostics_ = why.diagnostics();
+  publish_state(true);
 }
 
 void Session::pause() {
@@ -531,19 +544,8 @@ void Session::work() {
         (void)go_on_from_log(Json::object());
       } catch (const InputError& e) { diagnostics_.push_back(e.first_error()); }
     }
-  } catch (const InputError& e) {
-    steering_.reset();
-    phase_ = Phase::Failed;
-    failure_kind_ = "plan";
-    failure_ = e.first_error().message;
-    diagnostics_ = e.diagnostics();
-    publish_state(true);
-  } catch (const std::exception& e) {
-    steering_.reset();
-    phase_ = Phase::Failed;
-    failure_kind_ = "failed";
-    failure_ = e.what();
-    publish_state(true);
+  } catch (const InputError& e) { fail_to_build("plan", e); } catch (const std::exception& e) {
+    fail_to_build("failed", InputError("E940", e.what()));
   }
   for (auto last_zones = Clock::now();;) {
     std::deque<Task> tasks;
@@ -578,6 +580,7 @@ void Session::work() {
     } catch (const std::exception& e) {
       phase_ = Phase::Failed;
       failure_kind_ = "failed";
+      failure_code_ = "E940";
       failure_ = e.what();
       publish_state(true);
     }

@@ -124,6 +124,7 @@ class Session {
   Json save_plan(const Json& command);
   Json change(const std::string& word, Json command);
   collapse::Steering& core() const;
+  void fail_to_build(const char* kind, const InputError& why);
   collapse::Branch& branch_of(const Json& command) const;
   std::string phase_word() const;
 
@@ -150,7 +151,7 @@ class Session {
 
   // the clock
   Phase phase_ = Phase::Building;
-  std::string failure_, failure_kind_;
+  std::string failure_, failure_kind_, failure_code_;  // code: of plans and files
   std::vector<Diagnostic> diagnostics_;
   std::optional<double> speed_, until_;
   long frames_left_ = -1, steps_left_ = -1;

@@ -50,6 +50,8 @@ std::vector<std::string> command_words() {
 }  // namespace
 
 Steering& Session::core() const {
+  if (!steering_ && phase_ == Phase::Failed && failure_kind_ != "plan")
+    throw InputError(failure_code_, failure_, "apply the plan again when that is mended");
   if (!steering_)
     throw InputError("E930", phase_ == Phase::Failed ? "the plan cannot be run as it is" : "the model is being built",
                      phase_ == Phase::Failed ? "mend the plan's text and apply it" : "wait for the phase \"paused\"");
@@ -74,9 +76,11 @@ std::optional<Json> Session::perform(const Task& task) {
     publish_state(true);
     try {
       build(plan);
-    } catch (...) {
-      steering_.reset();
-      phase_ = Phase::Failed;
+    } catch (const InputError& e) {
+      fail_to_build("plan", e);
+      throw;
+    } catch (const std::exception& e) {
+      fail_to_build("failed", InputError("E940", e.what()));
       throw;
     }
     checked_plan_ = plan;
@@ -158,6 +162,7 @@ Json Session::run_clock(const std::string& word, const Json& command) {
       throw InputError("E930", "the branch has ended", "rewind, and branch or edit there");
     speed_start_ = rate_start_ = Clock::now();
     speed_time_ = rate_time_ = s.active().frontier();
+    rate_ = 0;
     phase_ = Phase::Running;
     publish_state(true);
   };

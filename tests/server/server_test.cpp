@@ -466,12 +466,17 @@ TEST_F(ServerTest, ARunHeldToASpeedTellsHowFarItIs) {
         [&](const TestJson& j) { return j["type"] == "state" && j["phase"] == "running" && j["time"] > last; });
     ASSERT_TRUE(s.is_object());
     last = s["time"];
+    EXPECT_TRUE(s["eta"].is_null() || s["eta"] >= 0) << s;
   }
   EXPECT_LT(last, 0.9);
   // and the log hears of it while it goes on
   EXPECT_TRUE(c->wait_for([](const TestJson& j) {
                  return j["type"] == "log" && j["entry"]["action"] == "reached" && j["entry"]["time"] < 0.9;
                }).is_object());
+  c->result("speed", {{"factor", nullptr}});
+  const TestJson over = c->wait_for_phase("finished");
+  ASSERT_TRUE(over.is_object());
+  EXPECT_TRUE(over["real_time_factor"].is_null() && over["eta"].is_null()) << over;
 }
 
 TEST_F(ServerTest, TellsAZonesPath) {
@@ -772,6 +777,29 @@ TEST_F(ServerTest, APlanWithErrorsIsMendedInThePage) {
   EXPECT_TRUE(c->wait_for_phase("finished").is_object());
   // another one beside it
   EXPECT_EQ(c->result("plan.apply", {{"text", one_stage("0.2 s")}, {"name", "short"}})["branch"], 2);
+}
+
+TEST_F(ServerTest, ALogThatCannotBeWrittenIsNoFaultOfThePlan) {
+  replace_file((folder_ / "out").string(), "in the way");
+  start(one_stage("0.3 s"));
+  auto c = std::make_unique<TestClient>(port());
+  ASSERT_TRUE(c->upgrade(server_->token()));
+  const TestJson hello = c->wait_for_type("hello");
+  const TestJson state =
+      hello["state"].is_object() && hello["state"]["phase"] == "failed" ? hello["state"] : c->wait_for_phase("failed");
+  ASSERT_TRUE(state.is_object());
+  EXPECT_EQ(state["ending"]["kind"], "failed");
+  EXPECT_EQ(state["ending"]["code"], "E940");
+  const TestJson error = c->command("run")["error"];
+  EXPECT_EQ(error["code"], "E940");
+  EXPECT_NE(error["message"].get<std::string>().find("the action log cannot be written: Not a directory"),
+            std::string::npos)
+      << error;
+  EXPECT_EQ(c->command("plan.apply", {{"text", one_stage("0.3 s")}})["error"]["code"], "E940");
+  fs::remove(folder_ / "out");
+  EXPECT_EQ(c->result("plan.apply", {{"text", one_stage("0.3 s")}})["branch"], 1);
+  c->result("run");
+  EXPECT_TRUE(c->wait_for_phase("finished").is_object());
 }
 
 TEST_F(ServerTest, CommandsDoNotWaitForFindings) {

@@ -85,6 +85,12 @@ function Banner(props: { s: SteerState }) {
   if (s.status.value === "lost")
     return <div class="banner warning" role="status" data-test="banner"><strong>No connection.</strong> The run goes on without this page; reconnecting…</div>;
   if (s.status.value === "ended") return <div class="banner bad" role="alert" data-test="banner"><strong>The server has ended.</strong> {again}</div>;
+  if (s.phase.value === "failed" && ending?.code === "E940")
+    return (
+      <div class="banner bad" role="alert" data-test="banner">
+        <strong>This session cannot go on.</strong> {prettify(ending.text)} {s.view.value === null ? "“Run as a new branch” below tries again." : "You see the last state."}
+      </div>
+    );
   if (s.phase.value === "failed" && s.view.value === null)
     return <div class="banner bad" role="alert" data-test="banner"><strong>This plan cannot be run as it is.</strong> {prettify(ending?.text ?? "")} Mend the text below; “Run as a new branch” tries again.</div>;
   if (s.phase.value === "failed") {

@@ -5,6 +5,7 @@ export type Phase = "building" | "equilibrium" | "paused" | "running" | "finishe
 export interface Ending {
   kind: string;
   text: string;
+  code?: string; // of "plan" and "failed"
 }
 export interface Charge {
   index: number;

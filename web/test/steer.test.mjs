@@ -547,6 +547,20 @@ describe("steering page", () => {
     await d.untilBranch("what-if 1");
   });
 
+  it("does not blame the plan for a log that cannot be written", async () => {
+    const session = server.sessions[0];
+    const { phase } = session;
+    const before = session.branch().ending;
+    session.branch().ending = { kind: "failed", code: "E940", text: "house.steer.jsonl: the action log cannot be written: No space left on device" };
+    session.phase = "failed";
+    session.tellState();
+    await d.until("banner", "This session cannot go on");
+    assert.match(await d.text("banner"), /No space left/);
+    session.branch().ending = before;
+    session.phase = phase;
+    session.tellState();
+  });
+
   it("shows the last good state of a run that diverged", async () => {
     const session = server.sessions[0];
     session.branch().ending = { kind: "failed", text: "The step at 3.012 s did not converge; the largest residual is in C-D1-0/foot." };
