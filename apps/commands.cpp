@@ -217,6 +217,8 @@ void print_leftovers(std::FILE* out, const Arguments& a, const Files& files) {
     if (entry.path().extension() == ".csv") outputs.push_back(entry.path());
   std::sort(outputs.begin(), outputs.end());
   there.insert(there.end(), outputs.begin(), outputs.end());
+  if (!a.checkpoint && !a.resume) there.push_back(fs::path(a.output) / "checkpoint.bin");
+  for (const std::string& path : find_unfinished_files(a.output)) there.emplace_back(path);
   std::string words;
   for (const fs::path& path : there) {
     const auto is_same = [&path](const auto& file) { return fs::path(file.second) == path; };

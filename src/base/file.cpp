@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <charconv>
@@ -174,9 +175,9 @@ void replace_file(const std::string& path, std::string_view bytes) {
   if (number != 0) fail(path, reason_of(number));
 }
 
-void remove_unfinished_files(const std::string& folder) {
+std::vector<std::string> find_unfinished_files(const std::string& folder) {
   std::error_code ignored;
-  std::vector<std::filesystem::path> found;
+  std::vector<std::string> found;
   for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
     const std::string name = entry.path().filename().string();
     if (!name.starts_with(kUnfinished) || !name.ends_with(kUnfinishedEnd)) continue;
@@ -184,9 +185,15 @@ void remove_unfinished_files(const std::string& folder) {
     const char *begin = name.data() + kUnfinished.size(), *end = name.data() + name.size();
     const auto [behind, error] = std::from_chars(begin, end, process);
     if (error != std::errc() || process <= 0 || behind == end || *behind != '-') continue;
-    if (::kill(process, 0) != 0 && errno == ESRCH) found.push_back(entry.path());
+    if (::kill(process, 0) != 0 && errno == ESRCH) found.push_back(entry.path().string());
   }
-  for (const std::filesystem::path& path : found) std::filesystem::remove(path, ignored);
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+void remove_unfinished_files(const std::string& folder) {
+  std::error_code ignored;
+  for (const std::string& path : find_unfinished_files(folder)) std::filesystem::remove(path, ignored);
 }
 
 }  // namespace topple

@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace topple {
 
@@ -15,7 +16,9 @@ std::string read_file(const std::string& path);
 /// the reason.
 void replace_file(const std::string& path, std::string_view bytes);
 
-/// Takes away what replace_file of processes that are no more has left in a folder; nothing else.
+/// What replace_file of processes that are no more has left in a folder, sorted.
+std::vector<std::string> find_unfinished_files(const std::string& folder);
+/// Takes that away; nothing else.
 void remove_unfinished_files(const std::string& folder);
 
 }  // namespace topple

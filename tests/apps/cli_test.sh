@@ -371,6 +371,16 @@ run)
   expect 0 "$topple" run "$plan" -o a/b --no-report
   has out "Left from before, not of this run: a/b/series.csv, a/b/events.csv, a/b/bodies.csv, a/b/findings.csv"
   expect 0 "$topple" run "$plan" -o a/b --csv --no-report; lacks out "Left from before"
+  # a checkpoint, and what a killed process left half written
+  sh -c 'exit 0' & gone=$!; wait $gone
+  echo half >"a/b/.topple-$gone-0.part"; echo others >"a/b/.topple-$$-0.part"; echo old >a/b/checkpoint.bin
+  expect 0 "$topple" run "$plan" -o a/b --csv --no-report
+  has out "Left from before, not of this run: a/b/checkpoint.bin, a/b/.topple-$gone-0.part"; lacks out ".topple-$$-0"
+  exists "a/b/.topple-$gone-0.part"
+  expect 0 "$topple" run "$plan" -o a/b --csv --no-report --checkpoint; lacks out "a/b/checkpoint.bin"
+  # complaints on standard error do not cut lines of standard output
+  rm -rf full; (ulimit -f $(($(stat -c %s a/b/record.h5) / 2048)); "$topple" run "$plan" -o full --no-report >both 2>&1)
+  [[ "$(tail -n 1 both)" == "topple: cannot write full/"*": File too large" ]] || { echo "cut by a complaint:"; cat both; failures=$((failures + 1)); }
   # the same plan and seed give the same bytes of poses
   expect 0 "$topple" run "$plan" -o d --csv --no-report --threads 2
   cmp a/b/series.csv d/series.csv || failures=$((failures + 1))

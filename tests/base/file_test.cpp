@@ -150,6 +150,8 @@ TEST_F(File, TakesAwayWhatProcessesThatAreNoMoreHaveLeft) {
                                          ".topple-" + std::to_string(gone) + ".part", "topple-1-1.part"};
   for (const std::string& name : kept) replace_file(path(name), "kept");
   replace_file(path(".topple-" + std::to_string(gone) + "-17.part"), "half");
+  EXPECT_EQ(find_unfinished_files(folder_.str()),
+            std::vector<std::string>{path(".topple-" + std::to_string(gone) + "-17.part")});
   remove_unfinished_files(folder_.str());
   EXPECT_FALSE(fs::exists(path(".topple-" + std::to_string(gone) + "-17.part")));
   for (const std::string& name : kept) EXPECT_TRUE(fs::exists(path(name))) << name;
