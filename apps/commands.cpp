@@ -444,6 +444,7 @@ int write_report_file(const Arguments& a) {
     const auto bundle = find_bundle("report.html");
     if (!bundle) {
       std::fprintf(stderr, "%s\n", kNoBundle);
+      if (a.json) print_failure(kNoBundle);
       return kRunFailed;
     }
     record::write_page(record::to_report_json(r, extras), *bundle, a.output, a.language);

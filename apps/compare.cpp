@@ -293,9 +293,7 @@ int compare_engines(const Arguments& a, const std::atomic<bool>& cancel) {
       if (shows) std::fprintf(stderr, "\r\x1b[2K%s ...", name.c_str());
     });
     if (shows) std::fprintf(stderr, "\r\x1b[2K");
-    if (a.json) {
-      std::printf("%s\n", to_json(model, c).dump(2, ' ', false, json::error_handler_t::replace).c_str());
-    } else {
+    if (!a.json) {
       std::printf("%s: %zu bodies, %.6g s in %ld instants; fixed steps are %.4g s\n\n",
                   model.name.empty() ? a.input.c_str() : model.name.c_str(), model.bodies.size(), options.duration,
                   std::lround(options.duration / c.interval), c.step);
@@ -321,6 +319,7 @@ int compare_engines(const Arguments& a, const std::atomic<bool>& cancel) {
     const bool all_ended = std::all_of(c.runs.begin(), c.runs.end(), [](const EngineRun& r) {
       return !r.has_run() || r.summary.ending == Ending::TimeLimit || r.summary.ending == Ending::AtRest;
     });
+    if (a.json) std::printf("%s\n", to_json(model, c).dump(2, ' ', false, json::error_handler_t::replace).c_str());
     return all_ended && c.runs.size() == list.size() ? kOk : kRunFailed;
   } catch (const InputError& e) { return refuse(e, text, a.json); }
 }

@@ -23,6 +23,13 @@ int run_demo(const Arguments& typed, const std::atomic<bool>& cancel) {
   } else if (read_file(plan) != kDemoPlan) {
     std::fprintf(stderr, "%s is not the demo's plan any more and is left as it is.\nRun it with: topple run %s -o %s\n",
                  plan.c_str(), plan.c_str(), a.output.c_str());
+    if (a.json)
+      print_refusal({{Severity::Error,
+                      "E802",
+                      {},
+                      1,
+                      plan + " is not the demo's plan any more and is left as it is",
+                      "give another folder to -o"}});
     return kBadInput;
   }
   std::FILE* out = a.json ? stderr : stdout;

@@ -119,11 +119,18 @@ int dispatch(const topple::apps::Arguments& a) {
 int main(int argc, char** argv) {
   if (std::signal(SIGHUP, SIG_IGN) == SIG_IGN) ignores_hangup = true;
   set_endings(on_interrupt);
-  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of its own
+  std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);  // complaints on standard error stand between lines
+  std::signal(SIGXFSZ, SIG_IGN);                  // a file that may not grow is an error of its own
   topple::study::on_waiting([](const std::string& what) {
     std::fprintf(stderr, "%stopple: %s\n", isatty(fileno(stderr)) != 0 ? "\r\x1b[K" : "", what.c_str());
   });
   const auto arguments = topple::apps::parse_arguments(argc, argv);
+  // of some verbs it is a format
+  const auto wants_json = [&arguments] {
+    using Verb = topple::apps::Arguments::Verb;
+    const auto* given = std::get_if<topple::apps::Arguments>(&arguments);
+    return given && given->json && given->verb != Verb::Export && given->verb != Verb::Rules;
+  };
   try {
     const int* stop = std::get_if<int>(&arguments);
     const int code = stop ? *stop : dispatch(std::get<topple::apps::Arguments>(arguments));
@@ -132,12 +139,11 @@ int main(int argc, char** argv) {
     return code == topple::apps::kBadInput ? code : topple::apps::kRunFailed;
   } catch (const topple::InputError& e) {
     std::fprintf(stderr, "%s\n", e.what());
-    const auto* given = std::get_if<topple::apps::Arguments>(&arguments);
-    if (given && given->json && given->verb != topple::apps::Arguments::Verb::Export)
-      topple::apps::print_refusal(e.diagnostics());
+    if (wants_json()) topple::apps::print_refusal(e.diagnostics());
     return topple::apps::kBadInput;
   } catch (const std::exception& e) {
     std::fprintf(stderr, "topple: %s\n", e.what());
+    if (wants_json()) topple::apps::print_failure(e.what());
     return topple::apps::kRunFailed;
   }
 }

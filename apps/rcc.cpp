@@ -322,8 +322,9 @@ std::optional<record::RccFuzzyReport> compute_fuzzy(const Arguments& a, const pr
   return r;
 }
 
-int say_cancelled() {
+int say_cancelled(bool as_json) {
   std::fprintf(stderr, "Cancelled. Nothing was written.\n");
+  if (as_json) print_failure("cancelled");
   return kRunFailed;
 }
 
@@ -372,7 +373,7 @@ int compute_rcc(const Arguments& a, const std::atomic<bool>& cancel) {
         throw InputError("E618", task.name + " has slabs as flanges, which the solid route does not know",
                          "use --route layered, or describe its section in a file of its own");
       const auto outcome = compute_solid(a, task, report, cancel);
-      if (!outcome) return say_cancelled();
+      if (!outcome) return say_cancelled(a.json);
       failures = *outcome;
     }
     std::fprintf(out, "%s: %s\n", report.title.c_str(), report.zone.c_str());
@@ -381,7 +382,7 @@ int compute_rcc(const Arguments& a, const std::atomic<bool>& cancel) {
     std::optional<record::RccFuzzyReport> fans;
     if (fuzzy) {
       fans = compute_fuzzy(a, *fuzzy, task, report, cancel);
-      if (!fans) return say_cancelled();
+      if (!fans) return say_cancelled(a.json);
       print_fuzzy(out, *fans);
     }
     if (!a.output.empty()) {

@@ -20,10 +20,18 @@ json to_json(const Diagnostic& d) {
           {"help", d.help}};
 }
 
-void print_refusal(const std::vector<Diagnostic>& list) {
-  json out{{"exit_code", kBadInput}, {"diagnostics", json::array()}};
+namespace {
+
+void print(int exit_code, const std::vector<Diagnostic>& list) {
+  json out{{"exit_code", exit_code}, {"diagnostics", json::array()}};
   for (const Diagnostic& d : list) out["diagnostics"].push_back(to_json(d));
   std::cout << dump(out) << std::endl;
 }
+
+}  // namespace
+
+void print_refusal(const std::vector<Diagnostic>& list) { print(kBadInput, list); }
+
+void print_failure(const std::string& why) { print(kRunFailed, {{Severity::Error, "E830", {}, 1, why, {}}}); }
 
 }  // namespace topple::apps

@@ -45,6 +45,7 @@ int replay_log(const Arguments& a, const std::atomic<bool>& cancel) {
     line.clear();
     if (progress.is_cancelled()) {
       std::fprintf(stderr, "Cancelled.\n");
+      if (a.json) print_failure("cancelled");
       return kRunFailed;
     }
     if (r.was_cut) std::fprintf(stderr, "The last line of the log has no end and is left out.\n");
@@ -55,6 +56,7 @@ int replay_log(const Arguments& a, const std::atomic<bool>& cancel) {
       if (b->frames() == 0) continue;
       if (progress.is_cancelled()) {
         std::fprintf(stderr, "Cancelled.\n");
+        if (a.json) print_failure("cancelled");
         return kRunFailed;
       }
       Arguments place = a;

@@ -117,20 +117,22 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   } catch (const study::ConnectionLost& e) {
     line.clear();
     std::fprintf(stderr, "topple: the store is away: %s\nGive the same command again to go on.\n", e.what());
+    if (a.json) print_failure(std::string("the store is away: ") + e.what());
     return kRunFailed;
   } catch (const study::DiskFailed& e) {
     line.clear();
     std::fprintf(stderr, "topple: %s\n", e.what());
     if (!remove_new())
       std::fprintf(stderr, "What was run before is kept. Make room and give the same command again to go on.\n");
+    if (a.json) print_failure(e.what());
     return kRunFailed;
   }
   line.clear();
-  if (a.json) std::fputs(study::write_results_json(problem, r).c_str(), stdout);
   std::FILE* out = a.json ? stderr : stdout;
   print_study(out, problem, r);
   std::fprintf(out, "\n");
   write_all(out, a.output, problem, r, text, a.input, a.language);
+  if (a.json) std::fputs(study::write_results_json(problem, r).c_str(), stdout);
   if (!r.is_finished) {
     std::fprintf(stderr, "Interrupted. The same command goes on with the study.\n");
     return kRunFailed;

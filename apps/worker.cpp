@@ -73,6 +73,7 @@ int run_worker(const Arguments& a, const std::atomic<bool>& cancel) {
     return kOk;
   } catch (const study::ConnectionLost& e) {
     std::fprintf(stderr, "topple: the store is away: %s\n", e.what());
+    if (a.json) print_failure(std::string("the store is away: ") + e.what());
     return kRunFailed;
   }
 }

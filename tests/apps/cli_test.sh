@@ -397,11 +397,22 @@ json)
     expect 1 sh -c '"$1" run stands.toml -o d --no-report --json >/dev/full' sh "$topple"
     has err "standard output could not be written"
   fi
+  # what cannot be written is told, too
+  failed() { expect 1 "$topple" "$@" --json; is_json out; has out '"exit_code": 1'; has out '"code": "E830"'; }
+  failed run "$plan" -o /proc/nowhere; has out "/proc/nowhere"
+  mkdir -p folder; failed report a/record.h5 -o folder; failed compare a/record.h5 a/record.h5 -o /proc/nowhere
+  failed new /proc/nowhere/plan.toml
+  printf '%s\n' '{"topple_log": 1}' >log; expect 2 "$topple" replay log -o x --json; is_json out
   # bad input is told on all verbs
   echo junk >junk
   told() { expect 2 "$topple" "$@" --json; is_json out; has out '"exit_code": 2'; has out '"code": "E'; }
   told replay junk -o x; told study "$plan" -o x; told study nowhere -o x; told study show nowhere; told mbs compare junk
   told check "$plan" --bogus; has out "there is no option --bogus"
+  told run "$plan" --bogus; has out "there is no option --bogus"; told run --bogus; has out "there is no option --bogus"
+  for words in "run p" "mbs run p" "rcc p" "fe p" "compare p p" "replay p" "study p" "steer p" demo "report p" "mbs compare p" "import p"; do
+    told $words -o ""; has out "--output: a f"
+  done
+  told run "$plan" -o x --knowledge ""; has out "--knowledge: a file is wanted"
   for words in "run p -o x" "mbs run p -o x" "mbs compare p" "rcc p -o x" "fe p -o x" "compare p p -o x" "replay p -o x" \
     "study p -o x" "new p" "import p -o x" "report p -o x" "steer p" "worker p" demo doctor run fe; do
     told $words --bogus
