@@ -473,13 +473,16 @@ void add_study(CLI::App& app, Arguments& a) {
   add_examples(study_export, R"(  topple study export study -o tables)");
 }
 
-/// A quantity that is given as "" is no quantity; one that is not given has its default.
-void refuse_empty_quantities(CLI::App& verb) {
+/// A quantity or a path that is given as "" is none; one that is not given has its default.
+void refuse_empty_values(CLI::App& verb) {
   for (CLI::Option* option : verb.get_options())
-    if (option->get_type_name() == "QUANTITY")
-      option->check(
-          [](const std::string& text) { return text.empty() ? std::string("a quantity is wanted") : std::string(); });
-  for (CLI::App* below : verb.get_subcommands([](CLI::App*) { return true; })) refuse_empty_quantities(*below);
+    for (const auto& [type, what] :
+         {std::pair("QUANTITY", "quantity"), {"FILE", "file"}, {"FOLDER", "folder"}, {"PATH", "path"}})
+      if (option->get_type_name() == type)
+        option->check([what = std::string(what)](const std::string& text) {
+          return text.empty() ? "a " + what + " is wanted" : std::string();
+        });
+  for (CLI::App* below : verb.get_subcommands([](CLI::App*) { return true; })) refuse_empty_values(*below);
 }
 
 void add_worker(CLI::App& app, Arguments& a) {
@@ -660,7 +663,7 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   CLI::App* manual = app.add_subcommand("manual", "Write the manual page, for man -l.");
   add_examples(manual, R"(  topple manual > topple.1                 then: man -l topple.1)");
   add_version(app, a);
-  refuse_empty_quantities(app);
+  refuse_empty_values(app);
 
   if (argc > 1 && argv[1][0] != '-') {
     std::vector<std::string> verbs;
@@ -680,6 +683,14 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
     if (!unknown.empty()) return refuse_words(app, argc, argv, unknown);
     std::ostringstream said;
     app.exit(e, std::cout, said);
+    return refuse_words(app, argc, argv, said.str());
+  } catch (const CLI::RequiredError& e) {
+    // what is missing may be behind a word that nobody knows
+    std::ostringstream said;
+    if (const std::string unknown = find_unknown(app); unknown.empty())
+      app.exit(e, std::cout, said);
+    else
+      said << unknown;
     return refuse_words(app, argc, argv, said.str());
   } catch (const CLI::ParseError& e) {
     std::ostringstream said;
