@@ -214,9 +214,12 @@ void add_fragment_findings(const product::Plan& plan, const Fragments& f, double
   std::string list;
   for (size_t i = 0; i < f.fragments.size(); ++i) {
     mass += f.fragments[i].mass;
-    if (i < 5)
-      list += fmt::format("{}{:.1f} t ({} bodies of the multibody model)", i ? ", " : "", f.fragments[i].mass / unit::t,
-                          f.fragments[i].bodies);
+    if (i >= 5) continue;
+    const double t = f.fragments[i].mass / unit::t;
+    const int bodies = f.fragments[i].bodies;
+    list += i ? ", " : "";
+    list += bodies == 1 ? fmt::format("{:.1f} t (1 body of the multibody model)", t)
+                        : fmt::format("{:.1f} t ({} bodies of the multibody model)", t, bodies);
   }
   add("farfield.fragments", "Rigid fragments",
       f.fragments.empty()

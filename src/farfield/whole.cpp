@@ -322,7 +322,7 @@ std::vector<std::string> describe(const MeshReport& r) {
                   1e3 * r.mesh.smallest_edge, r.smallest_edge_member, r.mesh.largest_aspect, 1e3 * r.mesh.critical_step,
                   r.critical_member));
   const auto share = [](double fit, const std::string& member) {
-    return fit == 1 ? std::string("100 %") : fmt::format("{:.1f} % ({})", 100 * fit, member);
+    return std::abs(fit - 1) < 5e-4 ? std::string("100.0 %") : fmt::format("{:.1f} % ({})", 100 * fit, member);
   };
   lines.push_back(fmt::format("Volumes: {} to {} of the plan's; their masses are the plan's.",
                               share(std::min(1.0, r.smallest_fit), r.smallest_member),

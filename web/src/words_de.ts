@@ -331,6 +331,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Rigid fragments", "Starre Bruchstücke"],
   ["None is left of a thousandth of the mass.", "Keines von einem Tausendstel der Masse ist übrig."],
   ["{} sound parts of a thousandth of the mass or more hold {:.1f} t: {*}.", "{} unversehrte Teile von einem Tausendstel der Masse oder mehr haben {} t: {}."],
+  ["{:.1f} t (1 body of the multibody model)", "{} t (1 Körper des Mehrkörpermodells)"],
   ["{:.1f} t ({:d} bodies of the multibody model)", "{} t ({} Körper des Mehrkörpermodells)"],
   ["and smaller ones", "und kleinere"],
   ["removal of its elements", "Entfernen seiner Elemente"],
