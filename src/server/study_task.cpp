@@ -155,6 +155,10 @@ void StudyTask::look(const study::StudyState* state) {
       samples_.push_back(sample);
       news.push_back(std::move(sample));
     }
+    if (state == nullptr) {
+      now_["done"] = samples_.size();
+      now_["failed"] = std::count_if(samples_.begin(), samples_.end(), [](const Json& s) { return s["ok"] == false; });
+    }
     Json bounds = Json::array();
     for (std::size_t i = 0; i < r.alpha.outputs.size() && i < r.outputs.size(); ++i) {
       Json b{{"output", r.outputs[i]}, {"alpha", Json::array()}, {"low", Json::array()}, {"high", Json::array()}};
@@ -212,8 +216,6 @@ void StudyTask::run() {
     end(r.is_finished ? "finished" : "cancelled",
         r.is_finished ? uncertainty::to_text(r.ending) : "cancelled; the same study goes on");
     look(nullptr);
-    const std::lock_guard lock(mutex_);
-    now_["done"] = samples_.size();
   } catch (const std::exception& e) {
     end("failed", e.what());
     on_news_(describe(), Json::array());

@@ -926,6 +926,7 @@ TEST_F(ServerTest, AStudyGrowsAndASampleIsPlayed) {
   } while (study["state"] == "running");
   EXPECT_EQ(study["state"], "finished") << study["text"];
   EXPECT_EQ(samples, 12U);
+  EXPECT_EQ(study["done"], 12);
   EXPECT_FALSE(study["inputs"].empty());
   EXPECT_FALSE(study["bounds"].empty());
   EXPECT_FALSE(study["possibilities"].empty());
