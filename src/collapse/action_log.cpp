@@ -178,7 +178,8 @@ Steering::Made LoggedSteering::perform(const Json& command) {
     throw std::runtime_error(path_ + ": the action log could not take an action, so none can be done any more");
   reserve(command);
   // what was computed beyond a cursor in the past is done again, too
-  if (!cursor.is_live && word != "rename") note_reached();
+  const Branch& from = s.active();
+  const bool is_left = word == "switch" || (!cursor.is_live && word != "rename");
   Steering::Made made;
   if (is_edit(word)) {
     made = s.edit(read_edit(command), read_text(command, "name", ""), read_flag(command, "in_place", false));
@@ -195,7 +196,6 @@ Steering::Made LoggedSteering::perform(const Json& command) {
     made.branch = &s.branch(which);
   } else if (word == "switch") {
     check_keys(command, {});
-    note_reached();
     s.switch_to(read_integer(command, "branch", 1, 1 << 30));
     made.branch = &s.active();
   } else if (word == "plan.apply") {
@@ -216,6 +216,7 @@ Steering::Made LoggedSteering::perform(const Json& command) {
   } else {
     throw InputError("E911", "\"" + word + "\" is not an action");
   }
+  if (is_left) note_reached(from);
   Json entry{{"seq", ++seq_}, {"action", word}, {"branch", id}, {"step", step}, {"time", time}};
   if (!cursor.is_live) entry["frame"] = cursor.frame;
   entry["made"] = made.branch->id;
@@ -225,8 +226,9 @@ Steering::Made LoggedSteering::perform(const Json& command) {
   return made;
 }
 
-void LoggedSteering::note_reached() {
-  const Branch& b = steering_->active();
+void LoggedSteering::note_reached() { note_reached(steering_->active()); }
+
+void LoggedSteering::note_reached(const Branch& b) {
   if (!b.run().has_begun()) return;
   const auto it = reached_.find(b.id);
   if (it != reached_.end() && it->second == b.steps()) return;

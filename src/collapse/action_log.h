@@ -46,6 +46,7 @@ class LoggedSteering {
   std::function<void(const std::string& line)> on_line;
 
  private:
+  void note_reached(const Branch&);
   void write(const nlohmann::ordered_json&);
   /// Room for an action in the file, so that none is done that cannot be written down. Throws std::runtime_error.
   void reserve(const nlohmann::ordered_json& command) const;

@@ -671,6 +671,17 @@ TEST(ActionLogReplay, ComputesAgainWhatLiesBeyondAnEditInThePast) {
   for (int id : {1, 2}) expect_same_motion(s.make_record(s.branch(id)), t.make_record(t.branch(id)));
 }
 
+TEST(ActionLog, HoldsNothingOfWhatIsRefused) {
+  LoggedSteering logged(two_stages(), default_knowledge(), options(), {}, "");
+  Steering& s = logged.steering();
+  ASSERT_TRUE(s.begin(s.active()));
+  advance_until(s, 0.4);
+  s.rewind(0.25);
+  for (const char* text : {R"({"command": "fire", "charge": 0})", R"({"command": "switch", "branch": 7})"})
+    EXPECT_THROW(logged.perform(Json::parse(text)), InputError) << text;
+  EXPECT_EQ(logged.lines().size(), 1u) << logged.lines().back();
+}
+
 TEST(ActionLogReplay, ALineThatCannotBeWrittenSpoilsNothing) {
   const std::string path = testing::TempDir() + "full.jsonl";
   std::filesystem::remove(path);
