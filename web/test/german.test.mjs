@@ -383,9 +383,17 @@ if (run === undefined && study === undefined)
           range.setEnd(n, word.index + word[0].length);
           return new Set([...range.getClientRects()].map((r) => Math.round(r.top))).size > 1;
         }).map(String)));
+      // with the longest name that studies of plans have
+      await page.locator("[data-test=fuzzy-results] table:last-of-type tbody td:first-child").last().evaluate((cell) => (cell.textContent = "touchdown_energy [MJ]"));
+      const cut = [];
+      for (const width of [1280, 800]) {
+        await page.setViewportSize({ width, height: 900 });
+        if (await page.$eval(".fuzzy-results", (section) => [...section.querySelectorAll("table")].some((table) => table.getBoundingClientRect().right > section.getBoundingClientRect().right))) cut.push(width);
+      }
       await close();
       assert.deepEqual(speeds, ["0,1×", "0,25×", "0,5×"]);
       assert.deepEqual(first, ["utilisation", "touchdown_energy_of_the_upper_block [MJ]"]);
       assert.deepEqual(broken, []);
+      assert.deepEqual(cut, [], "all columns are seen");
     });
   });
