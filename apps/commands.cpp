@@ -230,13 +230,25 @@ void print_leftovers(std::FILE* out, const Arguments& a, const Files& files) {
   if (!words.empty()) std::fprintf(out, "Left from before, not of this run: %s\n", words.c_str());
 }
 
+namespace {
+
+/// A run that is cancelled ends behind its last frame [s].
+double find_end(const record::Record& r) {
+  double end = r.time.empty() ? 0 : r.time.back();
+  for (const record::Event& e : r.events)
+    if (e.subject == r.ending && e.text == r.ending_text) end = std::max(end, e.time);
+  return end;
+}
+
+}  // namespace
+
 json summary_json(const record::Record& r, const Files& files, int exit_code) {
   json out;
   out["title"] = r.provenance.title;
   out["exit_code"] = exit_code;
   out["ending"] = r.ending;
   out["ending_text"] = r.ending_text;
-  out["simulated_time"] = r.time.empty() ? 0 : r.time.back();
+  out["simulated_time"] = find_end(r);
   out["wall_time"] = r.provenance.wall_time;
   out["step"] = r.provenance.step;
   out["seed"] = r.provenance.seed;

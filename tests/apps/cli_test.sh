@@ -528,6 +528,12 @@ cancel)
   wait $pid; code=$?
   [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; head out err; failures=$((failures + 1)); }
   exists a/record.h5; has out "Cancelled at"
+  # both times of the object are those of the end, not of the last frame
+  "$topple" run "$source/examples/weida/plan.toml" -o j --no-report --duration 500s --json >out 2>err &
+  pid=$!
+  for _ in $(seq 100); do grep -q "fired" err && break; sleep 0.1; done
+  kill -INT $pid; wait $pid
+  python3 -c 'import json; o = json.load(open("out")); assert o["ending_text"] == "Cancelled at %.2f s." % o["simulated_time"], o' || failures=$((failures + 1))
   # exports and what else takes its time end, and leave nothing behind that is not whole
   for words in "export a/record.h5 --vtk -o v" "fe $source/examples/weida/plan.toml --mesh-only --size 0.1m" \
     "export $source/examples/weida/plan.toml --lsdyna --size 0.1m -o v/model.k"; do
