@@ -122,7 +122,14 @@ LoggedSteering::LoggedSteering(const product::Plan& plan, const Knowledge& k, St
   steering_ = std::make_unique<Steering>(k, std::move(options), std::move(callbacks));
   steering_->add_root(plan, "main");
   if (!path_.empty()) file_ = open_new(path_);
-  write(header);
+  try {
+    write(header);
+  } catch (...) {  // nobody could go on with a log without its head
+    close(file_);
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);
+    throw;
+  }
 }
 
 LoggedSteering::~LoggedSteering() {

@@ -671,6 +671,20 @@ TEST(ActionLogReplay, ComputesAgainWhatLiesBeyondAnEditInThePast) {
   for (int id : {1, 2}) expect_same_motion(s.make_record(s.branch(id)), t.make_record(t.branch(id)));
 }
 
+TEST(ActionLog, ThatCannotBeBegunLeavesNoFile) {
+  const std::string path = testing::TempDir() + "headless.jsonl";
+  std::filesystem::remove(path);
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto old = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit tight{20, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &tight);
+  EXPECT_THROW(LoggedSteering(two_stages(), default_knowledge(), options(), {}, path), std::runtime_error);
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, old);
+  EXPECT_FALSE(std::filesystem::exists(path));
+}
+
 TEST(ActionLog, HoldsNothingOfWhatIsRefused) {
   LoggedSteering logged(two_stages(), default_knowledge(), options(), {}, "");
   Steering& s = logged.steering();

@@ -14,7 +14,7 @@ export function Diagnostics(props: { list: Diagnostic[]; onJump?: (d: Diagnostic
       {props.list.map((d) => (
         <li class={d.severity === "error" ? "bad" : "warning"}>
           <button type="button" class="plain" data-test="diagnostic" disabled={props.onJump === undefined} onClick={() => props.onJump?.(d)}>
-            <strong>{d.severity === "error" ? "✖ Error" : "⚠ Warning"} {d.code}</strong> line {d.line}, column {d.column}: {d.message}
+            <strong>{d.severity === "error" ? "✖ Error" : "⚠ Warning"} {d.code}</strong> {d.line > 0 ? `line ${d.line}, column ${d.column}: ` : ""}{d.message}
             {d.help !== undefined && d.help !== "" && <span class="quiet"> {d.help}</span>}
           </button>
         </li>
