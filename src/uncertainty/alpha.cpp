@@ -540,8 +540,21 @@ class Optimisation {
     o.tolerance = options_.tolerance * width_of(goal.output);
     if (seeks_edges()) o.edge = 1e-3;
     o.seed = options_.seed + ++searches_;
-    return std::make_unique<ModelSearch>(regions_[goal.level], asker_.archive()[start.sample].x,
-                                         tell_of(goal, start.sample), o);
+    const Region& region = regions_[goal.level];
+    const Point& from = asker_.archive()[start.sample].x;
+    auto search = std::make_unique<ModelSearch>(region, from, tell_of(goal, start.sample), o);
+    // runs nearby, the nearest last
+    std::vector<std::pair<double, int>> near;
+    for (int i = 0; i < asker_.asked() && goal.outcome != any_class; ++i) {
+      const Point& x = asker_.archive()[i].x;
+      double distance = 0;
+      for (const int k : region.axes) distance = std::max(distance, std::abs(x[k] - from[k]) / region.scale[k]);
+      if (i != start.sample && distance < 2 * radius && region.contains(x)) near.emplace_back(-distance, i);
+    }
+    std::sort(near.begin(), near.end());
+    for (const auto& [distance, i] : near) search->remember(asker_.archive()[i].x, tell_of(goal, i));
+    if (goal.outcome != any_class) search->adopt(planes_[search->outcome()]);
+    return search;
   }
 
   /// Whether kinks are followed: along constraints and for many inputs the planes would take too many runs.
@@ -602,6 +615,8 @@ class Optimisation {
         double& end = (is_over ? given_up_ : edges_).try_emplace(key_of(r.goal), infinite).first->second;
         end = std::min(end, r.search->value());
       }
+      const auto* model = dynamic_cast<const ModelSearch*>(r.search.get());
+      if (model) note_planes(*model);
       if (!r.search->is_converged()) continue;
       if (dynamic_cast<const LineSearch*>(r.search.get()) != nullptr) {
         if (const int at = asker_.archive().find(r.search->best()); at >= 0) scanned_[key_of(r.goal)].push_back(at);
@@ -616,13 +631,23 @@ class Optimisation {
         f.last = r.search->value(), f.last_at = r.search->best();
       }
       if (const int at = asker_.archive().find(r.search->best()); at >= 0 && !has_many_inputs()) note_end(r.goal, at);
-      const auto* model = dynamic_cast<const ModelSearch*>(r.search.get());
       if (seeks_edges() && model && model->is_at_edge() && !model->has_met_walls()) note_kinks(r.goal);
       const bool is_open = model && has_kinks(r.goal);
       double& end = (is_open ? edges_ : ends_).try_emplace(key_of(r.goal), infinite).first->second;
       end = std::min(end, r.search->value());
     }
     all.clear();
+  }
+
+  /// The boundary of an outcome is the same for all outputs and levels.
+  void note_planes(const ModelSearch& search) {
+    std::vector<Boundary::Plane>& known = planes_[search.outcome()];
+    for (const auto& p : search.boundary().planes()) {
+      std::erase_if(known, [&p](const Boundary::Plane& q) { return q.side.a == p.side.a && q.side.b == p.side.b; });
+      known.push_back(p);
+    }
+    constexpr long most = 60;
+    if (std::ssize(known) > most) known.erase(known.begin(), known.end() - most);
   }
 
   using Key = std::vector<int>;
@@ -957,10 +982,11 @@ class Optimisation {
   std::vector<double> levels_;
   std::vector<Region> regions_;
   std::vector<Box> boxes_;
-  std::vector<int> depth_;                  // per sample: in how many levels it lies
-  std::vector<int> space_points_;           // per level
-  std::map<Key, double> ends_;              // best value at which a search converged
-  std::set<std::pair<int, bool>> kinked_;   // output and sign
+  std::vector<int> depth_;                              // per sample: in how many levels it lies
+  std::vector<int> space_points_;                       // per level
+  std::map<int, std::vector<Boundary::Plane>> planes_;  // of the boundaries of outcomes, latest last
+  std::map<Key, double> ends_;                          // best value at which a search converged
+  std::set<std::pair<int, bool>> kinked_;               // output and sign
   std::map<Key, double> given_up_;          // at which searches along kinks neither ended nor gained any more
   std::map<Key, int> in_vain_;              // searches along kinks that did not end, nor gain
   std::map<Key, double> edges_;             // at which one stopped before a kink

@@ -6,6 +6,10 @@
 namespace topple::uncertainty {
 namespace {
 
+constexpr double accuracy = 0.02;  // of the length over which a plane was found, or is continued
+
+constexpr double edge_turn = 0.05;  // planes that are turned by more meet at an edge
+
 /// 1 - cos of the angle between two normals.
 double calc_turn(const HalfSpace& a, const HalfSpace& b) {
   double turn = 1;
@@ -18,7 +22,7 @@ double calc_turn(const HalfSpace& a, const HalfSpace& b) {
 void Boundary::clear() {
   planes_.clear();
   latest_ = {};
-  has_edges_ = false;
+  has_edges_ = is_turned_ = false;
 }
 
 /// Positive inside.
@@ -35,21 +39,20 @@ double Boundary::calc_offset(const Point& a, const Point& b) const {
 }
 
 bool Boundary::leaves_out(const Plane& p, const Point& from, double reach, const Places& inside) const {
-  constexpr double accuracy = 0.02;  // of the length over which a plane was found, or is continued
-  if (calc_distance(p, from) < -accuracy * p.reach) return true;
+  if (calc_distance(p, from) < -accuracy * calc_reach(p, from)) return true;
   return std::any_of(inside.begin(), inside.end(), [&](const Point* x) {
-    const double offset = calc_offset(*x, from);
-    return offset < 2 * reach && calc_distance(p, *x) < -accuracy * std::max(p.reach, offset);
+    return calc_offset(*x, from) < 2 * reach && calc_distance(p, *x) < -accuracy * calc_reach(p, *x);
   });
 }
 
 bool Boundary::keep(const WallProbe& wall, const Point& from, double reach, const Places& inside) {
   if (!wall.found()) return false;
-  Plane found{{wall.normal(), wall.calc_distance(from)}, wall.radius()};
+  Plane found{{wall.normal(), wall.calc_distance(from)}, from, wall.radius()};
   for (std::size_t k = 0; k < axes_.size(); ++k) found.side.b += found.side.a[k] * from[axes_[k]] / scale_[axes_[k]];
-  const bool is_turned = !latest_.side.a.empty() && calc_turn(latest_.side, found.side) > 0.05;
-  const bool is_first = is_turned && !has_edges_;
-  has_edges_ = has_edges_ || is_turned;
+  is_turned_ = !latest_.side.a.empty() && std::max(latest_.reach, found.reach) <= edge_reach_ &&
+               calc_turn(latest_.side, found.side) > edge_turn;
+  const bool is_first = is_turned_ && !has_edges_;
+  has_edges_ = has_edges_ || is_turned_;
   std::erase_if(planes_, [&](const Plane& p) {
     return calc_turn(p.side, found.side) < 0.001 || leaves_out(p, from, reach, inside);
   });
@@ -58,9 +61,28 @@ bool Boundary::keep(const WallProbe& wall, const Point& from, double reach, cons
   return is_first;
 }
 
-bool Boundary::explains(const Point& x) const {
-  return std::any_of(planes_.begin(), planes_.end(),
-                     [&](const Plane& p) { return calc_distance(p, x) < 0.005 * p.reach; });
+void Boundary::adopt(const std::vector<Plane>& planes, const Point& from, double reach, const Places& inside) {
+  for (const Plane& p : planes) {
+    const bool is_known =
+        std::any_of(planes_.begin(), planes_.end(), [&](const Plane& q) { return calc_turn(p.side, q.side) < 0.001; });
+    if (!is_known && calc_reach(p, from) <= 4 * reach && calc_distance(p, from) < 2 * reach &&
+        !leaves_out(p, from, reach, inside))
+      planes_.push_back(p);
+  }
+  for (const Plane& p : planes_) has_edges_ = has_edges_ || calc_turn(p.side, planes_.front().side) > edge_turn;
+}
+
+void Boundary::review(const Point& from, double reach, const Places& inside) {
+  std::erase_if(planes_,
+                [&](const Plane& p) { return calc_reach(p, from) > 4 * reach || leaves_out(p, from, reach, inside); });
+}
+
+bool Boundary::explains(const Point& x, double reach) const {
+  return std::any_of(planes_.begin(), planes_.end(), [&](const Plane& p) {
+    const double distance = calc_distance(p, x);
+    const double over = calc_reach(p, x);
+    return distance < -accuracy * over || (distance < 0.005 * over && over <= 4 * reach);
+  });
 }
 
 HalfSpace Boundary::see(const Plane& p, const Point& from, double margin) const {
@@ -77,7 +99,8 @@ std::vector<HalfSpace> Boundary::see_latest(const Point& from, double margin) co
   return {see(latest_, from, margin)};
 }
 
-Point Boundary::find_inner(const Point& from, double reach, const Places& inside, const Places& outside) const {
+std::pair<Point, double> Boundary::find_inner(const Point& from, double reach, const Places& inside,
+                                              const Places& outside) const {
   Places near;
   std::copy_if(outside.begin(), outside.end(), std::back_inserter(near),
                [&](const Point* x) { return calc_offset(*x, from) < 3 * reach; });
@@ -96,7 +119,7 @@ Point Boundary::find_inner(const Point& from, double reach, const Places& inside
     if (calc_offset(*x, from) > reach) continue;
     if (const double depth = calc_depth(*x); depth > most) most = depth, inner = x;
   }
-  return *inner;
+  return {*inner, std::sqrt(most)};
 }
 
 }  // namespace topple::uncertainty

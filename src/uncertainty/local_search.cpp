@@ -33,15 +33,16 @@ ModelSearch::ModelSearch(Region region, Point start, const Told& at_start, const
       region_(std::move(region)),
       options_(options),
       random_(options.seed),
+      program_(*region_.space, region_.alpha, region_.scale, region_.axes),
       radius_(options.radius),
-      trust_(4 * options.radius) {
+      trust_(4 * options.radius),
+      boundary_(region_.scale, region_.axes, 0.05) {
   for (const int i : region_.axes) {
     Axis axis;
     axis.input = i;
     axes_.push_back(axis);
   }
   converged_ = axes_.empty();
-  if (region_.space->has_interaction()) program_.emplace(*region_.space, region_.alpha, region_.scale, region_.axes);
   ask_star();
 }
 
@@ -56,6 +57,7 @@ void ModelSearch::ask_star() {
   pairs_.clear();
   stage_ = Stage::Star;
   wall_.reset();
+  boundary_.review(best_, radius_, list_insides());
   next_ = best_, next_value_ = value_, next_outcome_ = outcome_;
   if (axes_.empty() || iteration_ >= options_.iterations) return;
   const auto add = [this](const Point& x) {
@@ -128,7 +130,7 @@ void ModelSearch::ask_around_constraints() {
       };
       Point x = slide(here, u, radius_), target = best_;
       target[axes_[k].input] += sign * radius_ * region_.scale[axes_[k].input];
-      if (Point y = program_->project_from(best_, target, radius_); distance_to(y) < distance_to(x)) x = std::move(y);
+      if (Point y = program_.project_from(best_, target, radius_); distance_to(y) < distance_to(x)) x = std::move(y);
       double length = 0;
       for (const int i : region_.axes) length = std::max(length, std::abs(x[i] - best_[i]) / region_.scale[i]);
       if (length < 0.01 * radius_ || std::find(pending_.begin(), pending_.end(), x) != pending_.end()) continue;
@@ -161,6 +163,43 @@ void ModelSearch::read_aside(std::span<const Told> told) {
   for (std::size_t i = 0; i < open.size(); ++i) A[i][i] += 1e-9 * trace;
   if (!solve(A, slopes)) return;
   for (std::size_t i = 0; i < open.size(); ++i) axes_[open[i]].slope = slopes[i] / region_.scale[axes_[open[i]].input];
+}
+
+/// About a place of this outcome that lies off its boundary: along axes of which the star saw another outcome alone.
+void ModelSearch::ask_inner() {
+  pending_.clear();
+  stage_ = Stage::Inner;
+  const auto [inner, depth] = boundary_.find_inner(best_, 2 * radius_, list_insides(), list_walls());
+  const auto at =
+      std::find_if(insides_.begin(), insides_.end(), [&inner = inner](const Place& p) { return p.x == inner; });
+  if (at == insides_.end() || !std::isfinite(at->value)) return;
+  inner_ = *at;
+  const double h = 0.5 * std::min(depth, radius_);
+  for (const Axis& axis : axes_) {
+    if (axis.known || (axis.at_a < 0 && axis.at_b < 0)) continue;
+    for (const double sign : {-1.0, 1.0}) {
+      Point x = inner;
+      x[axis.input] += sign * h * region_.scale[axis.input];
+      x = clip(region_.box, std::move(x));
+      if (x != inner && region_.contains(x)) pending_.push_back(std::move(x));
+    }
+  }
+}
+
+void ModelSearch::read_inner(std::span<const Told> told) {
+  for (Axis& axis : axes_) {
+    if (axis.known || (axis.at_a < 0 && axis.at_b < 0)) continue;
+    // between the two places, or one and the middle
+    std::vector<std::pair<double, double>> along;
+    for (std::size_t k = 0; k < told.size(); ++k)
+      if (told[k].outcome == outcome_ && std::isfinite(told[k].value) &&
+          pending_[k][axis.input] != inner_.x[axis.input])
+        along.emplace_back(pending_[k][axis.input], told[k].value);
+    if (along.size() == 1) along.emplace_back(inner_.x[axis.input], inner_.value);
+    if (along.size() < 2) continue;
+    axis.slope = (along[1].second - along[0].second) / (along[1].first - along[0].first);
+    axis.known = true;
+  }
 }
 
 double ModelSearch::calc_model(const std::vector<double>& s) const {
@@ -299,7 +338,7 @@ void ModelSearch::find_allowed_step(std::vector<double>& step) {
   std::vector<double> other(axes_.size(), 0.0);
   descend(best), descend(other);
   if (calc_model(other) < calc_model(best)) best = other;
-  other = find_step_to(program_->minimise_from(best_, calc_quadratic(), trust_));
+  other = find_step_to(program_.minimise_from(best_, calc_quadratic(), trust_));
   if (calc_model(other) < calc_model(best)) best = other;
   value = calc_model(best);
   for (int trial = 0; trial < 4000 && width > 1e-9; ++trial) {
@@ -323,13 +362,34 @@ void ModelSearch::find_allowed_step(std::vector<double>& step) {
 /// Keeps the best point of this iteration, and places of other outcomes that are worse.
 void ModelSearch::note(std::span<const Told> told) {
   for (std::size_t k = 0; k < told.size(); ++k) {
-    if (told[k].value < next_value_) {
+    if (told[k].value < next_value_)
       next_ = pending_[k], next_value_ = told[k].value, next_outcome_ = told[k].outcome;
-    } else if (told[k].outcome != outcome_ && told[k].value >= value_) {
-      walls_.push_back(pending_[k]);
+    else if (told[k].outcome != outcome_ && told[k].value >= value_)
       has_met_walls_ = true;
-      if (walls_.size() > 200) walls_.erase(walls_.begin());
-    }
+    remember(pending_[k], told[k]);
+  }
+}
+
+Boundary::Places ModelSearch::list_walls() const {
+  Boundary::Places places;
+  for (const Point& x : walls_) places.push_back(&x);
+  return places;
+}
+
+Boundary::Places ModelSearch::list_insides() const {
+  Boundary::Places places;
+  for (const Place& p : insides_) places.push_back(&p.x);
+  return places;
+}
+
+void ModelSearch::remember(const Point& x, const Told& told) {
+  constexpr std::size_t most = 200;
+  if (told.outcome == outcome_) {
+    insides_.push_back({x, told.value});
+    if (insides_.size() > most) insides_.erase(insides_.begin());
+  } else if (told.value >= value_) {
+    walls_.push_back(x);
+    if (walls_.size() > most) walls_.erase(walls_.begin());
   }
 }
 
@@ -381,32 +441,48 @@ bool ModelSearch::is_bent() const {
   });
 }
 
+/// Where boundaries meet there are more to be located.
+int ModelSearch::most_probes() const {
+  return options_.probes + (boundary_.has_edges() ? static_cast<int>(axes_.size()) : 0);
+}
+
 /// Whether trials met another outcome that is worse, and what the model promised did not come.
 bool ModelSearch::is_blocked(std::span<const Told> told) const {
-  if (wall_ || probes_ >= options_.probes || next_outcome_ != outcome_ || value_ - next_value_ >= 0.5 * promised_)
-    return false;
-  return std::any_of(told.begin(), told.end(),
-                     [this](const Told& t) { return t.outcome != outcome_ && t.value >= value_; });
+  if (probes_ >= most_probes() || next_outcome_ != outcome_ || value_ - next_value_ >= 0.5 * promised_) return false;
+  if (wall_ && !boundary_.has_edges()) return false;
+  // where one plane is known, by what it does not explain
+  const bool is_first = !wall_ && boundary_.planes().empty();
+  for (std::size_t k = 0; k < told.size(); ++k)
+    if (told[k].outcome != outcome_ && told[k].value >= value_ &&
+        (is_first || !boundary_.explains(pending_[k], radius_)))
+      return true;
+  return false;
 }
 
 /// Starts to locate the boundary of the other outcome at its nearest place.
 bool ModelSearch::ask_probe() {
   const Point* nearest = nullptr;
   double least = infinite;
+  bool is_explained = true;
   for (const auto& w : walls_) {
-    double distance = 0;
-    for (const int i : region_.axes) distance = std::max(distance, std::abs(w[i] - best_[i]) / region_.scale[i]);
-    if (distance < least) least = distance, nearest = &w;
+    if (std::find(tried_.begin(), tried_.end(), w) != tried_.end()) continue;
+    const double distance = boundary_.calc_offset(w, best_);
+    const bool lies_beyond = boundary_.explains(w, radius_);
+    if (lies_beyond == is_explained ? distance < least : is_explained)
+      least = distance, nearest = &w, is_explained = lies_beyond;
   }
   if (nearest == nullptr || axes_.size() < 2) return false;
   ++probes_;
+  tried_.push_back(*nearest);
+  const bool has_edges = boundary_.has_edges();
+  const Point inside = has_edges ? boundary_.find_inner(best_, radius_, list_insides(), list_walls()).first : best_;
   WallProbe::Allow allow;
   if (region_.space->has_interaction()) allow = [region = region_](const Point& x) { return region.contains(x); };
   WallProbe::Project project;
-  if (program_)
-    project = [this](const Point& from, const Point& to) { return program_->project_from(from, to, 10 * radius_); };
-  wall_.emplace(region_.box, region_.scale, region_.axes, best_, *nearest, radius_, std::move(allow),
-                std::move(project));
+  if (region_.space->has_interaction())
+    project = [this](const Point& from, const Point& to) { return program_.project_from(from, to, 10 * radius_); };
+  wall_.emplace(region_.box, region_.scale, region_.axes, inside, *nearest, radius_, std::move(allow),
+                std::move(project), has_edges ? 2 : 0);
   pending_ = wall_->pending();
   stage_ = Stage::Probe;
   return !pending_.empty();
@@ -443,22 +519,62 @@ std::vector<double> ModelSearch::find_walled_step(double distance) const {
   return far;
 }
 
+/// Minimum of the model in the trust region, the box and half spaces that are seen from the best point, which may lie
+/// outside of them.
+std::vector<double> ModelSearch::find_sided_step(const std::vector<HalfSpace>& sides) {
+  const std::size_t n = axes_.size();
+  const Quadratic q = calc_quadratic();
+  std::vector<double> lower(n), upper(n), best(n, 0.0);
+  for (std::size_t k = 0; k < n; ++k) {
+    const int i = axes_[k].input;
+    lower[k] = std::max(-trust_, (region_.box.lower[i] - best_[i]) / region_.scale[i]);
+    upper[k] = std::min(trust_, (region_.box.upper[i] - best_[i]) / region_.scale[i]);
+  }
+  double least = infinite;
+  for (std::size_t turn = 0; turn <= 2 * n; ++turn) {
+    std::vector<double> start(n, 0.0);
+    if (turn > 0)
+      for (double& c : start) c = trust_ * random_.next(-1, 1);
+    start = project(sides, lower, upper, start);
+    const bool is_inside = std::all_of(sides.begin(), sides.end(), [&start](const HalfSpace& h) {
+      double at = -h.b;
+      for (std::size_t k = 0; k < start.size(); ++k) at += h.a[k] * start[k];
+      return at < 1e-9;
+    });
+    if (!is_inside) continue;
+    std::vector<double> v = minimise(q, sides, lower, upper, std::move(start));
+    if (const double value = q(v); value < least) least = value, best = std::move(v);
+  }
+  for (std::size_t k = 0; k < n; ++k) best[k] *= region_.scale[axes_[k].input];
+  return best;
+}
+
 void ModelSearch::ask_trials() {
   stage_ = Stage::Trial;
   pending_.clear();
   std::vector<double> whole = find_step(true);
   std::vector<std::vector<double>> steps;
-  if (wall_ && wall_->found()) {
+  const bool is_walled = wall_ && wall_->found(), has_edge = boundary_.planes().size() > (is_walled ? 1 : 0);
+  if (is_walled || has_edge) {
+    // within the constraints, and where planes meet within all of them
+    const auto add_programmed = [&](double part) {
+      const double margin = part * radius_;
+      const std::vector<HalfSpace> sides =
+          has_edge ? boundary_.see(best_, margin) : boundary_.see_latest(best_, margin);
+      steps.push_back(region_.space->has_interaction()
+                          ? find_step_to(program_.minimise_from(best_, calc_quadratic(), trust_, sides))
+                          : find_sided_step(sides));
+    };
     // as near to the wall as its curvature lets
     for (const double part : {0.3, 0.1, 0.03, 0.01, 0.0}) {
-      steps.push_back(find_walled_step(part * radius_));
-      if (!program_) continue;
-      // within the constraints, too
-      const HalfSpace side{wall_->normal(), wall_->calc_distance(best_) - part * radius_};
-      steps.push_back(find_step_to(program_->minimise_from(best_, calc_quadratic(), trust_, {side})));
+      if (is_walled) steps.push_back(find_walled_step(part * radius_));
+      if (region_.space->has_interaction() || has_edge) add_programmed(part);
     }
     promised_ = -calc_model(steps.back());
-    along_ = std::min(along_, promised_ / std::max(-calc_model(whole), options_.tolerance));
+    if (is_walled) along_ = std::min(along_, promised_ / std::max(-calc_model(whole), options_.tolerance));
+    // beyond planes that may be wrong
+    if (has_edge)
+      for (const double part : {-0.02, -0.1}) add_programmed(part);
   } else if (region_.space->has_interaction()) {
     std::vector<double> allowed = whole;
     find_allowed_step(allowed);
@@ -467,6 +583,7 @@ void ModelSearch::ask_trials() {
   } else {
     promised_ = -calc_model(whole);
   }
+  is_bound_ = (is_walled || has_edge) && promised_ < -0.99 * calc_model(whole);
   steps.push_back(whole);
   const bool settled = promised_ <= options_.tolerance && next_value_ >= value_ - options_.tolerance;
   if (!settled) {
@@ -491,21 +608,24 @@ void ModelSearch::finish_iteration() {
   const double gained = value_ - next_value_;
   double length = 0;
   for (const int i : region_.axes) length = std::max(length, std::abs(next_[i] - best_[i]) / region_.scale[i]);
-  if (next_outcome_ != outcome_) walls_.clear();
+  if (next_outcome_ != outcome_) walls_.clear(), insides_.clear(), boundary_.clear();
+  if (length > 0) tried_.clear();
   best_ = next_, value_ = next_value_, outcome_ = next_outcome_;
-  const bool walled = wall_ && wall_->found();
   // a way along the boundary may be long
   if (wall_ && (gained > 1e4 * options_.tolerance || gained > std::max(10 * options_.tolerance, 0.1 * promised_)))
     --probes_;
   if (gained > 1e4 * options_.tolerance) along_ = 1;
   const bool any_free = std::any_of(axes_.begin(), axes_.end(), [](const Axis& a) { return a.free; });
   // a plane is no more than the boundary's tangent
-  const double tolerance = walled ? 1000 * options_.tolerance : options_.tolerance;
-  const bool small = promised_ <= tolerance && gained <= tolerance;
-  const bool settled = small && !is_blind() && radius_ <= (any_free ? 0.01 : 0.03);
+  const double tolerance = is_bound_ || (wall_ && wall_->found()) ? 1000 * options_.tolerance : options_.tolerance;
+  // along a boundary that is round steps are short, and yet the way may be long
+  const double farther = is_bound_ ? std::max(1.0, 0.01 / trust_) : 1;
+  const bool small = farther * promised_ <= tolerance && farther * gained <= tolerance;
+  const bool settled = small && !is_blind() && radius_ <= (is_bound_ ? 0.003 : any_free ? 0.01 : 0.03);
   if (settled || radius_ < (has_met_walls_ ? options_.smallest : std::max(options_.smallest, options_.edge))) {
     // where a boundary stops it that is not located any more, the way along it may lead on
-    converged_ = settled || wall_ || probes_ < options_.probes || promised_ <= tolerance || along_ < 0.05;
+    converged_ = settled || wall_ || probes_ < most_probes() || promised_ <= tolerance ||
+                 (along_ < 0.05 && !boundary_.has_edges());
     at_edge_ = !settled || is_bent();
     pending_.clear();
     return;
@@ -525,6 +645,11 @@ void ModelSearch::tell(std::span<const Told> told) {
   switch (stage_) {
     case Stage::Star:
       read_star(told);
+      if (is_blind()) ask_inner();
+      if (stage_ != Stage::Inner || pending_.empty()) ask_trials();
+      break;
+    case Stage::Inner:
+      read_inner(told);
       ask_trials();
       break;
     case Stage::Probe: {
@@ -532,7 +657,9 @@ void ModelSearch::tell(std::span<const Told> told) {
       for (const auto& t : told) inside.push_back(t.outcome == outcome_);
       wall_->tell(inside);
       pending_ = wall_->pending();
-      if (pending_.empty()) ask_trials();
+      if (!pending_.empty()) break;
+      boundary_.keep(*wall_, best_, radius_, list_insides());
+      ask_trials();
       break;
     }
     case Stage::Trial:

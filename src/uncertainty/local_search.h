@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "uncertainty/boundary.h"
 #include "uncertainty/cut_program.h"
 #include "uncertainty/random.h"
 #include "uncertainty/space.h"
@@ -74,6 +75,12 @@ class ModelSearch : public LocalSearch {
   };
   ModelSearch(Region region, Point start, const Told& at_start, const Options& options);
   void tell(std::span<const Told> told) override;
+  /// A place that is known already: it may tell of slopes and boundaries near the start.
+  void remember(const Point& x, const Told& told);
+  /// Planes of the boundary that were found before; behind all that is remembered.
+  void adopt(const std::vector<Boundary::Plane>& planes) { boundary_.adopt(planes, best_, radius_, list_insides()); }
+  const Boundary& boundary() const { return boundary_; }
+  int outcome() const { return outcome_; }
   /// Whether it ended where the mapping is not smooth: the radius became too small, or curvatures grew as it did.
   bool is_at_edge() const { return at_edge_; }
   bool has_met_walls() const { return has_met_walls_; }
@@ -92,14 +99,20 @@ class ModelSearch : public LocalSearch {
     double di = 0, dj = 0;              // offsets
     int at = -1, at_i = -1, at_j = -1;  // pending points of both and of each
   };
+  struct Place {
+    Point x;
+    double value = 0;
+  };
   Point moved(const std::vector<double>& step) const;
   double calc_model(const std::vector<double>& step) const;
   std::vector<double> find_step(bool mixed, double push = 0) const;
   std::vector<double> find_walled_step(double distance) const;
+  std::vector<double> find_sided_step(const std::vector<HalfSpace>& sides);
   void note(std::span<const Told> told);
   bool is_bent() const;
   bool is_blind() const;
   bool is_blocked(std::span<const Told> told) const;
+  int most_probes() const;
   bool ask_probe();
   std::vector<double> to_widths(const std::vector<double>& step) const;
   std::vector<double> find_step_to(const Point&) const;
@@ -108,6 +121,10 @@ class ModelSearch : public LocalSearch {
   void descend(std::vector<double>& step) const;
   void ask_around_constraints();
   void read_aside(std::span<const Told> told);
+  void ask_inner();
+  void read_inner(std::span<const Told> told);
+  Boundary::Places list_insides() const;
+  Boundary::Places list_walls() const;
   void find_allowed_step(std::vector<double>& step);
   void ask_star();
   void read_star(std::span<const Told> told);
@@ -117,7 +134,7 @@ class ModelSearch : public LocalSearch {
   Region region_;
   Options options_;
   Random random_;
-  std::optional<CutProgram> program_;  // with interaction
+  CutProgram program_;
   std::vector<Axis> axes_;
   std::vector<Pair> pairs_;
   std::vector<int> aside_;        // pending points beside constraints
@@ -125,11 +142,16 @@ class ModelSearch : public LocalSearch {
   std::vector<double> hessian_;   // axes x axes
   double radius_, trust_;
   double promised_ = 0;
-  double along_ = 1;  // least part of what is promised here that a located boundary leaves
+  bool is_bound_ = false;  // by a located boundary
+  double along_ = 1;       // least part of what is promised here that a located boundary leaves
   int iteration_ = 0, probes_ = 0;
   bool at_edge_ = false, has_met_walls_ = false;
-  enum class Stage { Star, Probe, Trial } stage_ = Stage::Star;
-  std::vector<Point> walls_;  // places of other outcomes, latest last
+  enum class Stage { Star, Inner, Probe, Trial } stage_ = Stage::Star;
+  std::vector<Point> walls_;    // places of other outcomes, latest last
+  Place inner_;                 // about which slopes are looked for that the star does not tell
+  std::vector<Place> insides_;  // of the best point's outcome
+  std::vector<Point> tried_;    // places from which the boundary was looked for, since the best point moved
+  Boundary boundary_;           // near the best point
   std::optional<WallProbe> wall_;
   Point next_;  // best of this iteration
   double next_value_ = 0;

@@ -79,7 +79,7 @@ class Climb {
         scale_(calc_scale(space)),
         centre_(calc_centre(space)),
         axes_(find_axes(space)),
-        boundary_(scale_, axes_) {
+        boundary_(scale_, axes_, 0.03) {
     if (space.has_interaction()) cut_.emplace(space, 0, scale_, axes_);
   }
 
@@ -262,7 +262,7 @@ class Climb {
       if (outcome_of(s.result) == outcome_ || !(calc_membership(space_, s.x) > best_)) continue;
       if (std::find(tried_.begin(), tried_.end(), at) != tried_.end()) continue;
       const double distance = boundary_.calc_offset(s.x, best_x_);
-      const bool lies_beyond = distance > 2 * reach_ || boundary_.explains(s.x);
+      const bool lies_beyond = distance > 2 * reach_ || boundary_.explains(s.x, reach_);
       if (nearest < 0 || (lies_beyond == is_explained ? distance < least : !lies_beyond))
         least = distance, nearest = at, is_explained = lies_beyond;
     }
@@ -285,8 +285,9 @@ class Climb {
         project = [this](const Point& from, const Point& to) { return cut_->project_from(from, to, 10 * reach_); };
       const bool has_edges = boundary_.has_edges();
       const Point inside =
-          has_edges ? boundary_.find_inner(best_x_, reach_, find_places(archive, true), find_places(archive, false))
-                    : best_x_;
+          has_edges
+              ? boundary_.find_inner(best_x_, reach_, find_places(archive, true), find_places(archive, false)).first
+              : best_x_;
       wall_.emplace(
           support_, scale_, axes_, inside, archive[nearest].x, reach_,
           [this](const Point& x) { return calc_membership(space_, x) > 0; }, std::move(project), has_edges ? 4 : 0);
@@ -301,12 +302,13 @@ class Climb {
     promised_ = 0;
     if (wall_->found()) {
       // all planes; the latest alone, since a class may not be convex
-      for (const bool latest : boundary_.size() > 1 ? std::vector<bool>{false, true} : std::vector<bool>{true}) {
+      for (const bool latest :
+           boundary_.planes().size() > 1 ? std::vector<bool>{false, true} : std::vector<bool>{true}) {
         for (const double part : {0.0, 0.01, 0.03, 0.1, 0.3}) {
           const std::vector<HalfSpace> sides =
               latest ? boundary_.see_latest(best_x_, part * reach_) : boundary_.see(best_x_, part * reach_);
           Point x = find_most_possible(space_, scale_, axes_, best_x_, 2 * reach_, sides);
-          if (part == 0 && !(latest && boundary_.size() > 1)) promised_ = calc_membership(space_, x) - best_;
+          if (part == 0 && !(latest && boundary_.planes().size() > 1)) promised_ = calc_membership(space_, x) - best_;
           const bool is_flat = cut_ && !(promised_ > 0);
           if (is_flat) x = find_nearest_to_centre(sides.back());
           for (const double way : {1.0, 0.5, 0.25}) {
@@ -345,8 +347,8 @@ class Climb {
   void learn(const Archive& archive, double gained, bool moved) {
     const double part = promised_ > 0 ? gained / promised_ : moved ? 1 : 0;
     // what stopped it may be another plane
-    const bool is_new =
-        part <= 0.5 && boundary_.has_edges() && turns_ < std::ssize(axes_) && !find_beyond(archive).second;
+    const bool is_new = part <= 0.5 && boundary_.has_edges() &&
+                        turns_ < (boundary_.is_turned() ? std::ssize(axes_) : 2) && !find_beyond(archive).second;
     turns_ = is_new ? turns_ + 1 : 0;
     if (moved || !is_new) tried_.clear();
     if (!is_new) reach_ = std::min(largest_reach, reach_ * (part > 0.5 ? 1.2 : part > 0.2 ? 0.5 : 0.25));

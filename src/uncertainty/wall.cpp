@@ -53,13 +53,20 @@ Point WallProbe::blend(const Point& to, double t) const {
 WallProbe::Ray WallProbe::make_ray(int axis, bool is_mirrored) const {
   Ray r{outside_};
   r.axis = axis, r.is_mirrored = is_mirrored;
-  for (std::size_t k = 0; k < axes_.size(); ++k) {
-    double step = direction_[k];
-    if (axis >= 0)
-      step += (is_mirrored ? -1 : 1) * ((static_cast<int>(k) == axis ? 1.0 : 0.0) - direction_[axis] * direction_[k]);
-    r.to[axes_[k]] += radius_ * step * scale_[axes_[k]];
+  std::vector<double> turn(axes_.size(), 0.0);
+  double square = 0;
+  for (std::size_t k = 0; k < axes_.size() && axis >= 0; ++k) {
+    turn[k] = (is_mirrored ? -1 : 1) * ((static_cast<int>(k) == axis ? 1.0 : 0.0) - direction_[axis] * direction_[k]);
+    square += turn[k] * turn[k];
   }
+  for (std::size_t k = 0; k < axes_.size(); ++k)
+    r.to[axes_[k]] += radius_ * (direction_[k] + turn[k]) * scale_[axes_[k]];
   r.to = clip(box_, std::move(r.to));
+  // at an end of the box the other way tells more
+  double turned = 0;
+  for (std::size_t k = 0; k < axes_.size(); ++k)
+    turned += turn[k] * ((r.to[axes_[k]] - outside_[axes_[k]]) / scale_[axes_[k]] - radius_ * direction_[k]);
+  if (axis >= 0 && !is_mirrored && turned < 0.5 * radius_ * square) return make_ray(axis, true);
   if (project_ && !is_allowed(r.to)) r.to = project_(anchor_, r.to);
   if (!is_allowed(r.to)) {
     double in = 0, out = 1;

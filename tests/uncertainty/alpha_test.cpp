@@ -767,6 +767,24 @@ TEST(Alpha, SaysThatSearchesHaveNotConvergedWhereRunsAreLeft) {
 }
 
 // Searches saw no run of a thin class around them and took that for a place where nothing is to be gained.
+// The corner at which two half spaces and ends of inputs meet; 1.908333 and 1.7 by linear programmes.
+TEST(AlphaOfClasses, FindsCornersOfAWedge) {
+  const Evaluate model = make_evaluate([](const Point& x) {
+    const bool is_in = -.6 * x[0] + .8 * x[1] <= -.15 && .5 * x[0] - .6 * x[1] + .6 * x[2] <= .37;
+    return Result{Result::State::Done, {x[0] + x[1] + x[2]}, is_in ? 1 : 0, {}, ""};
+  });
+  const std::vector<FuzzyNumber> inputs(3, make_triangular(0, .5, 1));
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    AlphaOptions options;
+    options.seed = seed;
+    const AlphaResult r = optimise(inputs, model, options, {});
+    ASSERT_EQ(r.classes.size(), 2u);
+    const auto& levels = r.classes[1].outputs[0].levels;
+    EXPECT_NEAR(levels[0].upper.value, 1.908333, 3e-4) << seed;
+    EXPECT_NEAR(levels[1].upper.value, 1.7, 3e-4) << seed;
+  }
+}
+
 TEST(AlphaOfClasses, FollowsAThinClass) {
   const Evaluate model = make_evaluate([](const Point& x) {
     const bool is_in = std::abs(std::hypot(x[0] - 3, x[1] - 6) - 3.5) < 0.02;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 
 #include "reference_cases.h"
 
@@ -142,6 +143,37 @@ TEST(PossibilityPhysics, OfTheHighestOfManyIslands) {
     ASSERT_EQ(f.possibilities.classes.size(), 2u);
     EXPECT_NEAR(f.possibilities.classes[1].possibility, 0.821002, 1e-3) << "seed " << seed;
     EXPECT_TRUE(f.possibilities.classes[1].converged);
+  }
+}
+
+// Wedges and corners of two and three half spaces; linear programmes give the level at which the cut touches them.
+TEST(PossibilityPhysics, OfAWedgeOfHalfSpaces) {
+  struct Case {
+    std::vector<Point> rows;
+    Point ends;
+    double possibility;
+  };
+  const Case all[] = {
+      {{{.12, .13, -.66, .73}, {-.75, -.05, .64, -.17}}, {0, -.29}, .550887},
+      {{{.122778, .130496, -.656849, .732425}, {-.748323, -.047672, .638204, -.17446}}, {.00089, -.287237}, .550310},
+      {{{-.171022, .388073, .514021, .745609},
+        {.117542, -.27265, .81314, .500649},
+        {-.181211, -.912223, -.153697, -.333749}},
+       {.892534, .74939, -1.045029},
+       .634027},
+  };
+  const Space space{std::vector<FuzzyNumber>(4, make_triangular(0, .5, 1)), {}, {}};
+  for (const Case& c : all) {
+    const Evaluate model = make_classes([&c](const Point& x) {
+      for (std::size_t j = 0; j < c.rows.size(); ++j)
+        if (std::inner_product(x.begin(), x.end(), c.rows[j].begin(), 0.0) > c.ends[j]) return 0;
+      return 1;
+    });
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      const Found f = find(space, model, seed);
+      ASSERT_EQ(f.possibilities.classes.size(), 2u);
+      EXPECT_NEAR(f.possibilities.classes[1].possibility, c.possibility, 2e-4) << "seed " << seed;
+    }
   }
 }
 
