@@ -77,7 +77,7 @@ void print_outputs(std::FILE* out, const Problem& p, const StudyResult& r) {
   std::string head = fmt::format("{:<{}}", "Output", width + 2);
   for (const std::size_t k : shown) head += fmt::format("  {:^23}", fmt::format("alpha = {:.4g}", levels[k].alpha));
   std::fprintf(out, "\n%s\n", head.c_str());
-  bool has_open = false, has_gap = false;
+  bool has_open = false, has_hidden = false, has_gap = false;
   for (std::size_t o = 0; o < r.alpha.outputs.size() && o < r.outputs.size(); ++o) {
     const double unit = study::find_output(p, r.outputs[o]).unit_value;
     std::string line = fmt::format("  {:<{}}", title(o), width);
@@ -89,11 +89,16 @@ void print_outputs(std::FILE* out, const Problem& p, const StudyResult& r) {
       line += fmt::format("  {:>10} to {:<9}", bound(l.lower), bound(l.upper));
       has_gap = has_gap || l.lower.sample < 0;
     }
-    for (const auto& l : r.alpha.outputs[o].levels)
-      for (const uncertainty::Bound& b : {l.lower, l.upper}) has_open = has_open || (b.sample >= 0 && !b.converged);
+    for (std::size_t k = 0; k < r.alpha.outputs[o].levels.size(); ++k) {
+      const auto& l = r.alpha.outputs[o].levels[k];
+      bool& is_open = std::find(shown.begin(), shown.end(), k) != shown.end() ? has_open : has_hidden;
+      for (const uncertainty::Bound& b : {l.lower, l.upper}) is_open = is_open || (b.sample >= 0 && !b.converged);
+    }
     std::fprintf(out, "%s\n", line.substr(0, line.find_last_not_of(' ') + 1).c_str());
   }
   if (has_open && r.is_finished) std::fprintf(out, "  * no search has converged there\n");
+  if (has_hidden && r.is_finished)
+    std::fprintf(out, "  at levels that are not shown there are bounds at which no search has converged\n");
   if (has_gap) std::fprintf(out, "  - no run has a value there\n");
 }
 

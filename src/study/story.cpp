@@ -21,6 +21,29 @@ namespace {
 using record::Status;
 using uncertainty::failed_outcome;
 
+/// What a study gives with a mark of convergence: bounds, possibilities, and those with an input known.
+struct Marks {
+  int open = 0, all = 0;
+};
+
+Marks count_marks(const StudyResult& r) {
+  Marks m;
+  const auto add = [&m](bool is_converged) { m.open += !is_converged, ++m.all; };
+  const auto add_bounds = [&add](const std::vector<uncertainty::OutputBounds>& outputs) {
+    for (const auto& o : outputs)
+      for (const auto& l : o.levels)
+        for (const uncertainty::Bound& b : {l.lower, l.upper})
+          if (b.sample >= 0) add(b.converged);
+  };
+  add_bounds(r.alpha.outputs);
+  for (const auto& c : r.alpha.classes) add_bounds(c.outputs);
+  for (const auto& c : r.possibilities.classes) add(c.converged);
+  for (const auto& k : r.insights.knowing)
+    for (const auto& c : k.classes)
+      if (c.possibility > 0) add(c.converged);
+  return m;
+}
+
 /// What an outcome is in a sentence.
 std::string quoted(const std::string& name) { return name.empty() ? "the outcome without a name" : "\"" + name + "\""; }
 
@@ -554,14 +577,24 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
                     failed, runs, words_of_least(degree)),
         Status::Warning);
   }
+  const auto add_limit = [&] {
+    const Marks marks = count_marks(r);
+    if (marks.open > 0)
+      add("limit",
+          fmt::format("All runs that were allowed are used up before every search had converged: {} of {} bounds and "
+                      "possibilities may be wider or higher than shown.",
+                      marks.open, marks.all),
+          Status::Warning);
+    else
+      add("limit",
+          "All runs that were allowed are used up. Searches have converged for all bounds and possibilities; more runs "
+          "would look for what none of them came near.",
+          Status::Info);
+  };
   if (!r.is_finished)
     add("open", "The study is not finished: bounds and possibilities may still grow.", Status::Warning);
   else if (r.ending == uncertainty::Ending::LimitReached)
-    add("limit",
-        "All runs that were allowed are used up before every search had converged: bounds may be wider and "
-        "possibilities "
-        "higher than shown.",
-        Status::Warning);
+    add_limit();
   else if (r.ending == uncertainty::Ending::NotConverged)
     add("not_converged",
         "Some searches have not converged, though runs were left: bounds may be wider and possibilities higher than "

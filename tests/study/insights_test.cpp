@@ -630,6 +630,25 @@ TEST(Story, TellsOutputsWhereThereAreNoOutcomes) {
       << tell(p, more).front().text;
 }
 
+TEST(Story, TellsOfUsedUpRunsWhatTheyLeftOpen) {
+  const Folder folder;
+  const Problem p = make_small_problem();
+  StudyResult r = run(p, folder, "a", make_factories([](const Point& x) { return done({{"z", x[0]}}, ""); }));
+  const auto find_limit = [&]() -> Sentence {
+    for (Sentence& s : tell(p, r))
+      if (s.id == "limit") return std::move(s);
+    return {};
+  };
+  r.ending = uncertainty::Ending::Complete;
+  EXPECT_EQ(find_limit().text, "");
+  r.ending = uncertainty::Ending::LimitReached;
+  EXPECT_EQ(find_limit().status, record::Status::Info);
+  EXPECT_NE(find_limit().text.find("converged for all bounds and possibilities"), std::string::npos);
+  r.alpha.outputs[0].levels[0].upper.converged = false;
+  EXPECT_EQ(find_limit().status, record::Status::Warning);
+  EXPECT_NE(find_limit().text.find(": 1 of "), std::string::npos) << find_limit().text;
+}
+
 TEST(Story, GuaranteesNothingOfABoxThatIsBroken) {
   uncertainty::PermissibleBox b;
   b.volume = 0.3, b.samples = 3135, b.broken = 3, b.fresh = 149, b.tries = 4, b.violating = 0.03;
