@@ -244,8 +244,9 @@ std::optional<HalfSpace> CutProgram::find_face(const Point& end) const {
 
 /// The half space that supports the cut where the way from its centre to x leaves it; the last place inside is kept.
 std::optional<HalfSpace> CutProgram::find_support(const Point& x) {
-  const auto [in, out] = bisect(
+  const auto ends = bisect(
       centre_, x, [this](const Point& y) { return contains(y); }, 60);
+  const Point &in = ends.first, &out = ends.second;
   inside_.push_back(find_way(centre_, in));
   if (std::ssize(inside_) > most_planes) inside_.erase(inside_.begin() + 6 * std::ssize(axes_));
   if (auto face = find_face(in)) return face;
