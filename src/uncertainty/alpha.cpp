@@ -547,8 +547,7 @@ class Optimisation {
     std::vector<std::pair<double, int>> near;
     for (int i = 0; i < asker_.asked() && goal.outcome != any_class; ++i) {
       const Point& x = asker_.archive()[i].x;
-      double distance = 0;
-      for (const int k : region.axes) distance = std::max(distance, std::abs(x[k] - from[k]) / region.scale[k]);
+      const double distance = calc_offset(x, from, region.axes, region.scale);
       if (i != start.sample && distance < 2 * radius && region.contains(x)) near.emplace_back(-distance, i);
     }
     std::sort(near.begin(), near.end());

@@ -32,12 +32,6 @@ double Boundary::calc_distance(const Plane& p, const Point& x) const {
   return rest;
 }
 
-double Boundary::calc_offset(const Point& a, const Point& b) const {
-  double distance = 0;
-  for (const int i : axes_) distance = std::max(distance, std::abs(a[i] - b[i]) / scale_[i]);
-  return distance;
-}
-
 bool Boundary::leaves_out(const Plane& p, const Point& from, double reach, const Places& inside) const {
   if (calc_distance(p, from) < -accuracy * calc_reach(p, from)) return true;
   return std::any_of(inside.begin(), inside.end(), [&](const Point* x) {

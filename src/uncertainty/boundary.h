@@ -51,7 +51,7 @@ class Boundary {
   std::pair<Point, double> find_inner(const Point& from, double reach, const Places& inside,
                                       const Places& outside) const;
   /// The largest distance along an axis.
-  double calc_offset(const Point& a, const Point& b) const;
+  double calc_offset(const Point& a, const Point& b) const { return uncertainty::calc_offset(a, b, axes_, scale_); }
 
  private:
   double calc_distance(const Plane&, const Point&) const;

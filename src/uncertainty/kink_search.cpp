@@ -96,11 +96,7 @@ void KinkSearch::ask(const Point& x) {
   }
 }
 
-double KinkSearch::distance_to(const Point& x) const {
-  double distance = 0;
-  for (const int i : region_.axes) distance = std::max(distance, std::abs(x[i] - best_[i]) / region_.scale[i]);
-  return distance;
-}
+double KinkSearch::distance_to(const Point& x) const { return calc_offset(x, best_, region_.axes, region_.scale); }
 
 /// Nothing where values are missing or belong to another outcome.
 std::optional<KinkSearch::Plane> KinkSearch::read(std::span<const Told> told) const {

@@ -131,8 +131,7 @@ void ModelSearch::ask_around_constraints() {
       Point x = slide(here, u, radius_), target = best_;
       target[axes_[k].input] += sign * radius_ * region_.scale[axes_[k].input];
       if (Point y = program_.project_from(best_, target, radius_); distance_to(y) < distance_to(x)) x = std::move(y);
-      double length = 0;
-      for (const int i : region_.axes) length = std::max(length, std::abs(x[i] - best_[i]) / region_.scale[i]);
+      const double length = calc_offset(x, best_, region_.axes, region_.scale);
       if (length < 0.01 * radius_ || std::find(pending_.begin(), pending_.end(), x) != pending_.end()) continue;
       aside_.push_back(static_cast<int>(pending_.size()));
       pending_.push_back(std::move(x));
@@ -554,13 +553,13 @@ void ModelSearch::ask_trials() {
   pending_.clear();
   std::vector<double> whole = find_step(true);
   std::vector<std::vector<double>> steps;
-  const bool is_walled = wall_ && wall_->found(), has_edge = boundary_.planes().size() > (is_walled ? 1 : 0);
-  if (is_walled || has_edge) {
+  const bool is_walled = wall_ && wall_->found(), is_sided = boundary_.planes().size() > (is_walled ? 1 : 0);
+  if (is_walled || is_sided) {
     // within the constraints, and where planes meet within all of them
     const auto add_programmed = [&](double part) {
       const double margin = part * radius_;
       const std::vector<HalfSpace> sides =
-          has_edge ? boundary_.see(best_, margin) : boundary_.see_latest(best_, margin);
+          is_sided ? boundary_.see(best_, margin) : boundary_.see_latest(best_, margin);
       steps.push_back(region_.space->has_interaction()
                           ? find_step_to(program_.minimise_from(best_, calc_quadratic(), trust_, sides))
                           : find_sided_step(sides));
@@ -568,12 +567,12 @@ void ModelSearch::ask_trials() {
     // as near to the wall as its curvature lets
     for (const double part : {0.3, 0.1, 0.03, 0.01, 0.0}) {
       if (is_walled) steps.push_back(find_walled_step(part * radius_));
-      if (region_.space->has_interaction() || has_edge) add_programmed(part);
+      if (region_.space->has_interaction() || is_sided) add_programmed(part);
     }
     promised_ = -calc_model(steps.back());
     if (is_walled) along_ = std::min(along_, promised_ / std::max(-calc_model(whole), options_.tolerance));
     // beyond planes that may be wrong
-    if (has_edge)
+    if (is_sided)
       for (const double part : {-0.02, -0.1}) add_programmed(part);
   } else if (region_.space->has_interaction()) {
     std::vector<double> allowed = whole;
@@ -583,7 +582,7 @@ void ModelSearch::ask_trials() {
   } else {
     promised_ = -calc_model(whole);
   }
-  is_bound_ = (is_walled || has_edge) && promised_ < -0.99 * calc_model(whole);
+  is_bound_ = (is_walled || is_sided) && promised_ < -0.99 * calc_model(whole);
   steps.push_back(whole);
   const bool settled = promised_ <= options_.tolerance && next_value_ >= value_ - options_.tolerance;
   if (!settled) {
@@ -606,8 +605,7 @@ void ModelSearch::ask_trials() {
 void ModelSearch::finish_iteration() {
   ++iteration_;
   const double gained = value_ - next_value_;
-  double length = 0;
-  for (const int i : region_.axes) length = std::max(length, std::abs(next_[i] - best_[i]) / region_.scale[i]);
+  const double length = calc_offset(next_, best_, region_.axes, region_.scale);
   if (next_outcome_ != outcome_) walls_.clear(), insides_.clear(), boundary_.clear();
   if (length > 0) tried_.clear();
   best_ = next_, value_ = next_value_, outcome_ = next_outcome_;

@@ -75,6 +75,12 @@ Box make_box(const Space& space, double alpha) {
   return box;
 }
 
+double calc_offset(const Point& a, const Point& b, const std::vector<int>& axes, const std::vector<double>& scale) {
+  double distance = 0;
+  for (const int i : axes) distance = std::max(distance, std::abs(a[i] - b[i]) / scale[i]);
+  return distance;
+}
+
 bool is_in_cut(const Space& space, const Box& box, double alpha, const Point& x) {
   if (!box.contains(x) || !is_allowed(space, x)) return false;
   if (!space.joint) return true;

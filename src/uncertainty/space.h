@@ -47,6 +47,8 @@ Point clip(const Box&, Point);
 
 /// The cut of the inputs at alpha, without interaction.
 Box make_box(const Space&, double alpha);
+/// The largest distance along one of `axes`, by widths `scale`.
+double calc_offset(const Point& a, const Point& b, const std::vector<int>& axes, const std::vector<double>& scale);
 /// Whether x belongs to the cut at alpha, whose box is given: with interaction.
 bool is_in_cut(const Space&, const Box&, double alpha, const Point& x);
 

@@ -24,14 +24,7 @@ WallProbe::WallProbe(const Box& box, std::vector<double> scale, std::vector<int>
       allow_(std::move(allow)),
       project_(std::move(project)),
       most_nearer_(most_nearer) {
-  double length = 0;
-  for (const int i : axes_) {
-    direction_.push_back((outside_[i] - anchor_[i]) / scale_[i]);
-    length += direction_.back() * direction_.back();
-  }
-  length = std::sqrt(length);
-  if (!(length > 0)) return;
-  for (double& d : direction_) d /= length;
+  if (!(aim(outside_) > 0)) return;
   // places further inside, from which the rays may start
   for (const double part : {0.25, 0.5, 1.0}) {
     Point x = anchor_;
@@ -41,6 +34,26 @@ WallProbe::WallProbe(const Box& box, std::vector<double> scale, std::vector<int>
     pending_.push_back(std::move(x));
   }
   if (pending_.empty()) tell({});
+}
+
+/// Turns the rays from the anchor towards a place; gives its distance.
+double WallProbe::aim(const Point& to) {
+  direction_.clear();
+  double length = 0;
+  for (const int i : axes_) {
+    direction_.push_back((to[i] - anchor_[i]) / scale_[i]);
+    length += direction_.back() * direction_.back();
+  }
+  length = std::sqrt(length);
+  if (length > 0)
+    for (double& d : direction_) d /= length;
+  return length;
+}
+
+/// The one towards what is aimed at, and one turned to each axis.
+void WallProbe::make_rays() {
+  rays_.clear();
+  for (int axis = -1; axis < static_cast<int>(axes_.size()); ++axis) rays_.push_back(make_ray(axis, false));
 }
 
 Point WallProbe::blend(const Point& to, double t) const {
@@ -95,7 +108,7 @@ void WallProbe::tell(const std::vector<bool>& is_inside) {
   if (!has_anchor_) {
     has_anchor_ = true;
     for (std::size_t k = 0; k < pending_.size() && is_inside[k]; ++k) anchor_ = pending_[k];
-    for (int axis = -1; axis < static_cast<int>(axes_.size()); ++axis) rays_.push_back(make_ray(axis, false));
+    make_rays();
   } else {
     std::size_t next = 0;
     for (auto& r : rays_) {
@@ -139,19 +152,12 @@ bool WallProbe::is_bent() const {
 void WallProbe::ask_nearer() {
   ++nearer_;
   const Ray middle = rays_.front();
-  double length = 0;
-  for (std::size_t k = 0; k < axes_.size(); ++k) {
-    direction_[k] = (middle.to[axes_[k]] - anchor_[axes_[k]]) / scale_[axes_[k]];
-    length += direction_[k] * direction_[k];
-  }
-  length = std::sqrt(length);
-  for (double& d : direction_) d /= length;
+  const double length = aim(middle.to);
   radius_ *= 0.125;
   outside_ = blend(middle.to, middle.out);
   anchor_ = blend(middle.to, std::max(0.0, middle.in - radius_ / length));
   normal_.clear();
-  rays_.clear();
-  for (int axis = -1; axis < static_cast<int>(axes_.size()); ++axis) rays_.push_back(make_ray(axis, false));
+  make_rays();
   ask_sections();
   if (pending_.empty()) fit();
 }

@@ -45,7 +45,9 @@ class WallProbe {
   };
   bool is_allowed(const Point& x) const { return !allow_ || allow_(x); }
   Point blend(const Point& to, double t) const;
+  double aim(const Point& to);
   Ray make_ray(int axis, bool is_mirrored) const;
+  void make_rays();
   void ask_sections();
   bool is_bent() const;
   void ask_nearer();
