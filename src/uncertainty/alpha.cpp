@@ -615,7 +615,7 @@ class Optimisation {
         end = std::min(end, r.search->value());
       }
       const auto* model = dynamic_cast<const ModelSearch*>(r.search.get());
-      if (model) note_planes(*model);
+      if (model) model->is_at_jump() ? jumps_[r.goal.output].add(model->get_side()) : note_planes(*model);
       if (!r.search->is_converged()) continue;
       if (dynamic_cast<const LineSearch*>(r.search.get()) != nullptr) {
         if (const int at = asker_.archive().find(r.search->best()); at >= 0) scanned_[key_of(r.goal)].push_back(at);
@@ -647,6 +647,16 @@ class Optimisation {
     }
     constexpr long most = 60;
     if (std::ssize(known) > most) known.erase(known.begin(), known.end() - most);
+  }
+
+  /// Sides of jumps that were found in one cut, in all of them.
+  void share_jumps() {
+    std::vector<Point> points;
+    for (auto& [output, jumps] : jumps_)
+      for (const JumpSide& side : jumps.take_new())
+        for (const double alpha : levels_)
+          for (Point& x : find_places(space_, alpha, side)) points.push_back(std::move(x));
+    if (!points.empty()) ask(points);
   }
 
   using Key = std::vector<int>;
@@ -924,6 +934,7 @@ class Optimisation {
     std::map<Key, std::pair<double, int>> in_vain;  // best value when it was last searched from, turns without gain
     while (asker_.can_go_on()) {
       check_faces(of_classes);
+      share_jumps();
       std::vector<Running> all;
       for (const Goal& goal : make_goals(of_classes)) {
         const Candidate best = find_best(goal);
@@ -984,6 +995,7 @@ class Optimisation {
   std::vector<int> depth_;                              // per sample: in how many levels it lies
   std::vector<int> space_points_;                       // per level
   std::map<int, std::vector<Boundary::Plane>> planes_;  // of the boundaries of outcomes, latest last
+  std::map<int, Jumps> jumps_;                          // by output
   std::map<Key, double> ends_;                          // best value at which a search converged
   std::set<std::pair<int, bool>> kinked_;               // output and sign
   std::map<Key, double> given_up_;          // at which searches along kinks neither ended nor gained any more

@@ -40,6 +40,7 @@ bool Boundary::leaves_out(const Plane& p, const Point& from, double reach, const
 }
 
 bool Boundary::keep(const WallProbe& wall, const Point& from, double reach, const Places& inside) {
+  has_kept_ = false;
   if (!wall.found()) return false;
   Plane found{{wall.normal(), wall.calc_distance(from)}, from, wall.radius()};
   for (std::size_t k = 0; k < axes_.size(); ++k) found.side.b += found.side.a[k] * from[axes_[k]] / scale_[axes_[k]];
@@ -50,7 +51,8 @@ bool Boundary::keep(const WallProbe& wall, const Point& from, double reach, cons
   std::erase_if(planes_, [&](const Plane& p) {
     return calc_turn(p.side, found.side) < 0.001 || leaves_out(p, from, reach, inside);
   });
-  if (!leaves_out(found, from, reach, inside)) planes_.push_back(found);
+  has_kept_ = !leaves_out(found, from, reach, inside);
+  if (has_kept_) planes_.push_back(found);
   latest_ = std::move(found);
   return is_first;
 }

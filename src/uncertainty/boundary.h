@@ -34,6 +34,8 @@ class Boundary {
   bool has_edges() const { return has_edges_; }
   /// Whether the latest plane is turned against the one before.
   bool is_turned() const { return is_turned_; }
+  /// Whether it is among those that are kept.
+  bool has_kept() const { return has_kept_; }
   /// Takes planes that were found before, as far as they lie near and leave nothing out.
   void adopt(const std::vector<Plane>&, const Point& from, double reach, const Places& inside);
   /// Drops planes that leave out what is known now, or are too coarse for `reach`.
@@ -65,7 +67,7 @@ class Boundary {
   double edge_reach_;
   std::vector<Plane> planes_;
   Plane latest_;
-  bool has_edges_ = false, is_turned_ = false;
+  bool has_edges_ = false, is_turned_ = false, has_kept_ = false;
 };
 
 }  // namespace topple::uncertainty

@@ -12,6 +12,10 @@ namespace topple::uncertainty {
 namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
+constexpr int beyond = std::numeric_limits<int>::min();  // outcome of what lies beyond a jump
+constexpr int most_sections = 10;                        // that a jump is located by
+constexpr int most_jumps = 6;
+constexpr double part_beyond = 0.3;  // of a jump, by which a place misses the model of this side that lies beyond
 
 }  // namespace
 
@@ -608,7 +612,11 @@ void ModelSearch::finish_iteration() {
   const double length = calc_offset(next_, best_, region_.axes, region_.scale);
   if (next_outcome_ != outcome_) walls_.clear(), insides_.clear(), boundary_.clear();
   if (length > 0) tried_.clear();
-  best_ = next_, value_ = next_value_, outcome_ = next_outcome_;
+  best_ = next_, value_ = next_value_;
+  if (next_outcome_ == beyond)
+    jump_ = 0, radius_ = std::max(radius_, 0.5 * options_.radius);
+  else
+    outcome_ = next_outcome_;
   // a way along the boundary may be long
   if (wall_ && (gained > 1e4 * options_.tolerance || gained > std::max(10 * options_.tolerance, 0.1 * promised_)))
     --probes_;
@@ -619,13 +627,17 @@ void ModelSearch::finish_iteration() {
   // along a boundary that is round steps are short, and yet the way may be long
   const double farther = is_bound_ ? std::max(1.0, 0.01 / trust_) : 1;
   const bool small = farther * promised_ <= tolerance && farther * gained <= tolerance;
-  const bool settled = small && !is_blind() && radius_ <= (is_bound_ ? 0.003 : any_free ? 0.01 : 0.03);
+  const bool settled = small && !is_blind() &&
+                       radius_ <= (is_bound_  ? (boundary_.has_edges() ? 3e-4 : 0.003)
+                                   : any_free ? 0.01
+                                              : 0.03);
   if (settled || radius_ < (has_met_walls_ ? options_.smallest : std::max(options_.smallest, options_.edge))) {
     // where a boundary stops it that is not located any more, the way along it may lead on
     converged_ = settled || wall_ || probes_ < most_probes() || promised_ <= tolerance ||
                  (along_ < 0.05 && !boundary_.has_edges());
     at_edge_ = !settled || is_bent();
     pending_.clear();
+    ask_section((settled ? 1e5 : 100) * options_.tolerance);
     return;
   }
   const bool good = gained > 0 && gained >= 0.5 * promised_;
@@ -638,17 +650,142 @@ void ModelSearch::finish_iteration() {
   ask_star();
 }
 
-void ModelSearch::tell(std::span<const Told> told) {
+// ---- jumps of the value
+
+/// Whether a place of the same outcome lies on the other side of the jump, as the model of this side tells.
+bool ModelSearch::is_beyond(const Point& x, double value) const {
+  const std::size_t n = axes_.size();
+  double foretold = side_.at.value;
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto offset = [&](std::size_t k) { return x[axes_[k].input] - side_.at.x[axes_[k].input]; };
+    double row = 0;
+    for (std::size_t j = 0; j < n; ++j) row += side_.hessian[i * n + j] * offset(j);
+    foretold += offset(i) * (side_.slope[i] + 0.5 * row);
+  }
+  return std::abs(value - foretold) > part_beyond * jump_;
+}
+
+/// What is told, with what lies beyond the jump as another outcome.
+std::vector<Told> ModelSearch::split_at_jump(std::span<const Told> told) const {
+  std::vector<Told> split(told.begin(), told.end());
+  for (std::size_t k = 0; k < split.size() && jump_ > 0; ++k)
+    if (split[k].outcome == outcome_ && std::isfinite(split[k].value) && is_beyond(pending_[k], split[k].value))
+      split[k].outcome = beyond;
+  return split;
+}
+
+/// Looks for a jump, or another one, between the best point and the worst place near it, if that is worse by `least`.
+bool ModelSearch::ask_section(double least) {
+  if (jumps_ >= most_jumps || axes_.size() < 2) return false;
+  const Place* worst = nullptr;
+  for (const Place& p : insides_)
+    if (boundary_.calc_offset(p.x, best_) <= 2 * radius_ && std::isfinite(p.value) &&
+        (worst == nullptr || p.value > worst->value))
+      worst = &p;
+  if (worst == nullptr || worst->value - value_ < least) return false;
+  near_ = {best_, value_}, far_ = *worst;
+  rise_ = far_.value - near_.value, section_ = 0;
+  Point x = near_.x;
+  for (const Axis& axis : axes_) x[axis.input] += 0.5 * (far_.x[axis.input] - x[axis.input]);
+  pending_ = {std::move(x)};
+  stage_ = Stage::Section;
+  return true;
+}
+
+/// A jump stays as high, however near its places are; a slope does not.
+void ModelSearch::read_section(const Told& told) {
+  const Point x = pending_.front();
+  pending_.clear();
+  if (told.outcome != outcome_ || !std::isfinite(told.value)) return;
+  if (told.value < value_) best_ = x, value_ = told.value, converged_ = false;
+  const bool is_low = std::abs(told.value - near_.value) < std::abs(far_.value - told.value);
+  (is_low ? near_ : far_) = {x, told.value};
+  if (std::abs(far_.value - near_.value) < 0.5 * rise_) return;
+  if (++section_ == most_sections) {
+    stay_before_jump();
+    return;
+  }
+  Point middle = near_.x;
+  for (const Axis& axis : axes_) middle[axis.input] += 0.5 * (far_.x[axis.input] - middle[axis.input]);
+  if (middle != near_.x && middle != far_.x) pending_ = {std::move(middle)};
+}
+
+/// From now on what lies beyond counts as another outcome.
+void ModelSearch::stay_before_jump() {
+  ++jumps_;
+  const double rise = std::abs(far_.value - near_.value);
+  jump_ = jump_ > 0 ? std::min(jump_, rise) : rise;
+  has_met_walls_ = true;
+  side_ = {
+      {best_, value_}, std::vector<double>(axes_.size(), 0.0), std::vector<double>(axes_.size() * axes_.size(), 0.0)};
+  std::vector<Place> places;
+  std::swap(places, insides_);
+  walls_.clear(), tried_.clear(), boundary_.clear();
+  for (Place& p : places) {
+    if (boundary_.calc_offset(p.x, best_) > 2 * radius_ || !std::isfinite(p.value)) continue;
+    if (is_beyond(p.x, p.value))
+      walls_.push_back(std::move(p.x));
+    else
+      insides_.push_back(std::move(p));
+  }
+  insides_.push_back(near_), walls_.push_back(far_.x);
+  is_wide_ = false;
+  converged_ = at_edge_ = false;
+  probes_ = 0, along_ = 1;
+  ask_star();
+}
+
+JumpSide ModelSearch::get_side() const {
+  JumpSide s{region_.axes, {}, {}};
+  for (const Boundary::Plane& p : boundary_.planes()) s.in.push_back(p.side);
+  for (const Axis& axis : axes_) s.slope.push_back(axis.slope * region_.scale[axis.input]);
+  return s;
+}
+
+/// As wide a star as the slopes let tell what lies beyond.
+bool ModelSearch::widen_star() {
+  if (jump_ == 0 || is_wide_) return false;
+  is_wide_ = true;
+  double rise = 0;
+  for (const Axis& axis : axes_) rise += std::abs(axis.slope) * region_.scale[axis.input];
+  const double widest = 0.05, radius = rise > 0 ? std::min(widest, 0.5 * part_beyond * jump_ / rise) : widest;
+  if (radius <= radius_) return false;
+  radius_ = radius, trust_ = 4 * radius;
+  return true;
+}
+
+/// Behind the star.
+void ModelSearch::conclude_star() {
+  if (jump_ > 0) {
+    side_.at = {best_, value_}, side_.hessian = hessian_;
+    // where the star saw nothing of this side slopes stay as they were
+    for (std::size_t k = 0; k < axes_.size(); ++k)
+      axes_[k].known || axes_[k].slope != 0 ? side_.slope[k] = axes_[k].slope : axes_[k].slope = side_.slope[k];
+  }
+  if (widen_star())
+    ask_star();
+  else
+    ask_trials();
+}
+
+void ModelSearch::tell(std::span<const Told> given) {
+  if (stage_ == Stage::Section) {
+    read_section(given.front());
+    return;
+  }
+  const std::vector<Told> told = split_at_jump(given);
   note(told);
   switch (stage_) {
     case Stage::Star:
       read_star(told);
       if (is_blind()) ask_inner();
-      if (stage_ != Stage::Inner || pending_.empty()) ask_trials();
+      if (stage_ != Stage::Inner || pending_.empty()) conclude_star();
       break;
     case Stage::Inner:
       read_inner(told);
-      ask_trials();
+      conclude_star();
+      break;
+    case Stage::Section:
       break;
     case Stage::Probe: {
       std::vector<bool> inside;
@@ -657,6 +794,11 @@ void ModelSearch::tell(std::span<const Told> told) {
       pending_ = wall_->pending();
       if (!pending_.empty()) break;
       boundary_.keep(*wall_, best_, radius_, list_insides());
+      // places near would lead to the same mixture of planes
+      if ((jump_ > 0 || boundary_.has_edges()) && !boundary_.has_kept())
+        std::copy_if(
+            walls_.begin(), walls_.end(), std::back_inserter(tried_),
+            [this, from = tried_.back()](const Point& x) { return boundary_.calc_offset(x, from) < 0.25 * radius_; });
       ask_trials();
       break;
     }

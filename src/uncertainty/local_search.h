@@ -9,6 +9,7 @@
 
 #include "uncertainty/boundary.h"
 #include "uncertainty/cut_program.h"
+#include "uncertainty/jump.h"
 #include "uncertainty/random.h"
 #include "uncertainty/space.h"
 #include "uncertainty/wall.h"
@@ -84,6 +85,9 @@ class ModelSearch : public LocalSearch {
   /// Whether it ended where the mapping is not smooth: the radius became too small, or curvatures grew as it did.
   bool is_at_edge() const { return at_edge_; }
   bool has_met_walls() const { return has_met_walls_; }
+  /// Whether its boundary is that of a jump of the value, of which outcomes do not tell.
+  bool is_at_jump() const { return jump_ > 0; }
+  JumpSide get_side() const;
 
  private:
   struct Axis {
@@ -102,6 +106,11 @@ class ModelSearch : public LocalSearch {
   struct Place {
     Point x;
     double value = 0;
+  };
+  /// The model about a place.
+  struct Model {
+    Place at;
+    std::vector<double> slope, hessian;  // (axes), (axes x axes)
   };
   Point moved(const std::vector<double>& step) const;
   double calc_model(const std::vector<double>& step) const;
@@ -126,6 +135,13 @@ class ModelSearch : public LocalSearch {
   Boundary::Places list_insides() const;
   Boundary::Places list_walls() const;
   void find_allowed_step(std::vector<double>& step);
+  bool is_beyond(const Point&, double value) const;
+  std::vector<Told> split_at_jump(std::span<const Told> told) const;
+  bool ask_section(double least);
+  void read_section(const Told& told);
+  void stay_before_jump();
+  bool widen_star();
+  void conclude_star();
   void ask_star();
   void read_star(std::span<const Told> told);
   void ask_trials();
@@ -146,13 +162,20 @@ class ModelSearch : public LocalSearch {
   double along_ = 1;       // least part of what is promised here that a located boundary leaves
   int iteration_ = 0, probes_ = 0;
   bool at_edge_ = false, has_met_walls_ = false;
-  enum class Stage { Star, Inner, Probe, Trial } stage_ = Stage::Star;
+  enum class Stage { Star, Inner, Probe, Trial, Section } stage_ = Stage::Star;
   std::vector<Point> walls_;    // places of other outcomes, latest last
   Place inner_;                 // about which slopes are looked for that the star does not tell
   std::vector<Place> insides_;  // of the best point's outcome
   std::vector<Point> tried_;    // places from which the boundary was looked for, since the best point moved
   Boundary boundary_;           // near the best point
   std::optional<WallProbe> wall_;
+  double jump_ = 0;      // of the value, at which this side ends; 0: none is known
+  Model side_;           // tells which places lie beyond it
+  bool is_wide_ = true;  // the star is as wide as the jump lets
+  int jumps_ = 0;        // that were met
+  Place near_, far_;     // between which a jump is looked for
+  double rise_ = 0;      // of the value, when that began
+  int section_ = 0;
   Point next_;  // best of this iteration
   double next_value_ = 0;
   int next_outcome_ = 0;

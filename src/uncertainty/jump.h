@@ -1,0 +1,36 @@
+#pragma once
+/// Jumps of a value between runs of one outcome (docs/theory/uncertainty.md, section 3): where else they may bound it.
+
+#include <vector>
+
+#include "uncertainty/boundary.h"
+#include "uncertainty/space.h"
+
+namespace topple::uncertainty {
+
+/// The side of a jump on which a search ended.
+struct JumpSide {
+  std::vector<int> axes;      // inputs that vary
+  std::vector<HalfSpace> in;  // that it lies in, from the zero point by widths of the supports
+  std::vector<double> slope;  // of what is minimised there, by widths
+};
+
+/// Places of a cut that tell whether it reaches such a side, and what there is best: the deepest one, and the best one
+/// if planes and slopes go on as they are. None where the cut ends before, or other inputs vary. They cost no runs.
+std::vector<Point> find_places(const Space&, double alpha, const JumpSide&);
+
+/// What is known of the jumps of one output.
+class Jumps {
+ public:
+  void add(JumpSide);
+  /// Sides that were not taken before: those that were added, what lies beyond a single plane, and the pieces between
+  /// planes that were found by different searches.
+  std::vector<JumpSide> take_new();
+
+ private:
+  std::vector<JumpSide> sides_;
+  std::size_t taken_ = 0;
+  std::vector<HalfSpace> planes_;
+};
+
+}  // namespace topple::uncertainty
