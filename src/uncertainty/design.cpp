@@ -559,13 +559,19 @@ void review_boxes(const Space& space, std::vector<PermissibleBox>& boxes, const 
                   const Archive& archive, const DesignOptions& options) {
   const Review review(space, requirement, archive, options);
   for (PermissibleBox& b : boxes) review.measure(b);
-  // places by robustness and by distance are added; the larger volume decides a tie
-  const auto place = [&boxes](const PermissibleBox& b, double PermissibleBox::*what) {
-    return std::count_if(boxes.begin(), boxes.end(), [&](const auto& o) { return o.kept && o.*what > b.*what; });
+  // places by robustness and by distance are added, those that are alike share one; the larger volume decides a tie
+  constexpr double alike = 0.02;  // of the robustness, and of the range of the requirement
+  const auto count_better = [&boxes](const auto& is_better) {
+    return std::count_if(boxes.begin(), boxes.end(), [&](const PermissibleBox& o) { return o.kept && is_better(o); });
   };
   std::vector<std::pair<long, std::size_t>> order;
-  for (std::size_t k = 0; k < boxes.size(); ++k)
-    order.emplace_back(place(boxes[k], &PermissibleBox::robustness) + place(boxes[k], &PermissibleBox::distance), k);
+  for (std::size_t k = 0; k < boxes.size(); ++k) {
+    const PermissibleBox& b = boxes[k];
+    order.emplace_back(count_better([&b](const PermissibleBox& o) {
+                         return o.robustness > (1 + alike) * b.robustness;
+                       }) + count_better([&b](const PermissibleBox& o) { return o.distance > b.distance + alike; }),
+                       k);
+  }
   std::stable_sort(order.begin(), order.end(), [&boxes](const auto& a, const auto& b) {
     const auto &p = boxes[a.second], &q = boxes[b.second];
     if (p.kept != q.kept) return p.kept;
