@@ -745,11 +745,12 @@ JumpSide ModelSearch::get_side() const {
 /// As wide a star as the slopes let tell what lies beyond.
 bool ModelSearch::widen_star() {
   if (jump_ == 0 || is_wide_) return false;
-  is_wide_ = true;
   double rise = 0;
   for (const Axis& axis : axes_) rise += std::abs(axis.slope) * region_.scale[axis.input];
   const double widest = 0.05, radius = rise > 0 ? std::min(widest, 0.5 * part_beyond * jump_ / rise) : widest;
-  if (radius <= radius_) return false;
+  // slopes of a narrow star are those of the model's noise, too
+  is_wide_ = radius < 1.5 * radius_;
+  if (is_wide_) return false;
   radius_ = radius, trust_ = 4 * radius;
   return true;
 }

@@ -841,6 +841,26 @@ TEST(AlphaAtJumps, FollowsAnEdgeOfTwo) {
   }
 }
 
+TEST(AlphaAtJumps, FollowsAPlaneThroughNoise) {
+  const Evaluate model = make_evaluate_values([](const Point& x) {
+    const double wild = std::fmod(std::abs(43758.5453 * std::sin(7919.77 * x[0] + 12989.8 * x[1] + 3571.3 * x[2])), 1);
+    return std::vector{.4 * x[0] + .2 * x[1] - .12 * x[2] - (x[0] + .8 * x[1] + .6 * x[2] >= 1.5 ? .3 : 0) +
+                       1e-4 * (2 * wild - 1)};
+  });
+  const std::vector<FuzzyNumber> inputs(3, make_triangular(0, .5, 1));
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    AlphaOptions options;
+    options.seed = seed;
+    const AlphaResult r = optimise(inputs, model, options, {});
+    // behind the plane, at the largest x1 and x2
+    for (const int k : {0, 1, 2}) {
+      const LevelBounds& l = r.outputs[0].levels[static_cast<std::size_t>(k)];
+      const double high = 1 - .5 * l.alpha;
+      EXPECT_NEAR(l.lower.value, .4 * (1.5 - 1.4 * high) + .2 * high - .12 * high - .3, 1e-3) << seed << " " << l.alpha;
+    }
+  }
+}
+
 TEST(AlphaAtJumps, SeesAPieceThatALevelJustReaches) {
   // at the level 0.5 the corner 0.75, 0.75, 0.75 lies 0.03 beyond the plane
   const Evaluate model = make_evaluate_values(
