@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "uncertainty/boundary.h"
 #include "uncertainty/cut_program.h"
@@ -100,7 +101,8 @@ class Climb {
   /// Takes notice of new samples.
   void refresh(const Archive& archive) {
     for (; seen_ < static_cast<int>(archive.size()); ++seen_) {
-      if (outcome_of(archive[seen_].result) != outcome_) continue;
+      ours_.push_back(options_.classify(archive[seen_].result) == outcome_);
+      if (!ours_.back()) continue;
       const Point& x = archive[seen_].x;
       if (support_.contains(x)) {
         const double mu = calc_membership(space_, x);
@@ -187,7 +189,7 @@ class Climb {
 
   bool is_ours(const Archive& archive, const Point& x) const {
     const int i = archive.find(x);
-    return i >= 0 && outcome_of(archive[i].result) == outcome_;
+    return i >= 0 && ours_[i];
   }
 
   void begin() {
@@ -239,10 +241,10 @@ class Climb {
 
   Boundary::Places find_places(const Archive& archive, bool ours) const {
     Boundary::Places places;
-    for (const Sample& s : archive.samples())
-      if ((outcome_of(s.result) == outcome_) == ours && boundary_.calc_offset(s.x, best_x_) < 3 * reach_ &&
-          (!ours || calc_membership(space_, s.x) > 0))
-        places.push_back(&s.x);
+    for (int i = 0; i < seen_; ++i)
+      if (const Point& x = archive[i].x; ours_[i] == ours && boundary_.calc_offset(x, best_x_) < 3 * reach_ &&
+                                         (!ours || calc_membership(space_, x) > 0))
+        places.push_back(&x);
     return places;
   }
 
@@ -257,12 +259,12 @@ class Climb {
     int nearest = -1;
     double least = 0;
     bool is_explained = true;
-    for (int at = 0; at < static_cast<int>(archive.size()); ++at) {
-      const Sample& s = archive[at];
-      if (outcome_of(s.result) == outcome_ || !(calc_membership(space_, s.x) > best_)) continue;
+    for (int at = 0; at < seen_; ++at) {
+      const Point& x = archive[at].x;
+      if (ours_[at] || !(calc_membership(space_, x) > best_)) continue;
       if (std::find(tried_.begin(), tried_.end(), at) != tried_.end()) continue;
-      const double distance = boundary_.calc_offset(s.x, best_x_);
-      const bool lies_beyond = distance > 2 * reach_ || boundary_.explains(s.x, reach_);
+      const double distance = boundary_.calc_offset(x, best_x_);
+      const bool lies_beyond = distance > 2 * reach_ || boundary_.explains(x, reach_);
       if (nearest < 0 || (lies_beyond == is_explained ? distance < least : !lies_beyond))
         least = distance, nearest = at, is_explained = lies_beyond;
     }
@@ -403,7 +405,7 @@ class Climb {
     };
     std::vector<std::pair<double, int>> ours;
     for (int i = 0; i < seen_; ++i)
-      if (outcome_of(archive[i].result) == outcome_) ours.emplace_back(-calc_membership(space_, archive[i].x), i);
+      if (ours_[i]) ours.emplace_back(-calc_membership(space_, archive[i].x), i);
     std::stable_sort(ours.begin(), ours.end());
     std::vector<Point> points;
     // the best ones, and as many of the others
@@ -456,6 +458,7 @@ class Climb {
   double best_ = 0, resolution_ = 1;
   double beside_ = -1;  // largest μ of runs outside the support, moved there, as long as none lies inside
   int sample_ = -1, seen_ = 0, round_ = 0;
+  std::vector<bool> ours_;  // which of the samples seen are of the class
   bool converged_ = false;
   std::optional<CutProgram> cut_;  // the support, with interaction
   std::optional<WallProbe> wall_;
@@ -477,8 +480,9 @@ PossibilityResult find_possibilities(const Space& space, Asker& asker, const Pos
   int seen = 0;
   const auto note_classes = [&] {
     for (; seen < asker.asked(); ++seen) {
-      const int c = outcome_of(asker.archive()[seen].result);
-      climbs.try_emplace(c, space, c, options);
+      const int c = options.classify(asker.archive()[seen].result);
+      if (std::find(options.skipped.begin(), options.skipped.end(), c) == options.skipped.end())
+        climbs.try_emplace(c, space, c, options);
     }
   };
   note_classes();
@@ -510,12 +514,12 @@ PossibilityResult find_possibilities(const Space& space, Asker& asker, const Pos
   return result;
 }
 
-Possibility read_possibility(const Space& space, const Archive& archive, int outcome) {
+Possibility read_possibility(const Space& space, const Archive& archive, int outcome, const Classify& classify) {
   Possibility p;
   p.outcome = outcome;
   const Box support = make_box(space, 0);
   for (int i = 0; i < static_cast<int>(archive.size()); ++i) {
-    if (outcome_of(archive[i].result) != outcome || !support.contains(archive[i].x)) continue;
+    if (classify(archive[i].result) != outcome || !support.contains(archive[i].x)) continue;
     const double mu = calc_membership(space, archive[i].x);
     if (mu > p.possibility || p.sample < 0) p.possibility = mu, p.sample = i;
   }
@@ -523,6 +527,22 @@ Possibility read_possibility(const Space& space, const Archive& archive, int out
   p.converged = p.possibility >= 1;
   p.resolution = 1 - p.possibility;
   return p;
+}
+
+std::vector<Possibility> read_possibilities(const Space& space, const Archive& archive,
+                                            const std::vector<Possibility>& known, const Classify& classify) {
+  const Box support = make_box(space, 0);
+  std::set<int> classes;
+  for (const Sample& s : archive.samples())
+    if (is_in_cut(space, support, 0, s.x)) classes.insert(classify(s.result));
+  std::vector<Possibility> all;
+  for (const int c : classes) {
+    Possibility& seen = all.emplace_back(read_possibility(space, archive, c, classify));
+    for (const Possibility& k : known)
+      if (k.outcome == c && seen.possibility <= k.possibility + PossibilityOptions{}.tolerance)
+        seen.resolution = k.resolution, seen.converged = k.converged || seen.converged;
+  }
+  return all;
 }
 
 std::vector<Point> make_ray(const Space& space, const Point& x, int count) {

@@ -2,14 +2,18 @@
 /// How possible each outcome class is: Π_c = sup { μ(x) : class(x) = c } (docs/theory/uncertainty.md, section 4).
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "uncertainty/alpha.h"
 
 namespace topple::uncertainty {
 
+/// The class of a run: its outcome, or what else runs are parted by (a requirement that is kept or broken).
+using Classify = std::function<int(const Result&)>;
+
 struct Possibility {
-  int outcome = 0;         // failed_outcome for failed runs
+  int outcome = 0;         // or another class; failed_outcome for failed runs
   double possibility = 0;  // μ of a run of this class: an inner estimate
   double resolution = 0;   // towards the core on the last ray, the next run of another class lies so much higher in μ
   int sample = -1;         // the run that has it, in the archive; -1: none in the support
@@ -27,6 +31,8 @@ struct PossibilityOptions {
   int spread = 40;  // points per input above what was found, at last
   /// Found before: a class that has converged and of which no run is more possible by now is not searched again.
   std::vector<Possibility> known = {};
+  Classify classify = outcome_of;
+  std::vector<int> skipped = {};  // classes that another search looks for
 };
 
 struct PossibilityResult {
@@ -40,7 +46,11 @@ struct PossibilityResult {
 PossibilityResult find_possibilities(const Space&, Asker&, const PossibilityOptions&);
 
 /// What the runs of one class show, without a search: its best one, those above it; towards the core nothing is known.
-Possibility read_possibility(const Space&, const Archive&, int outcome);
+Possibility read_possibility(const Space&, const Archive&, int outcome, const Classify& = outcome_of);
+/// The same of all classes of runs in the support, rising. What a search found of one stays known where no run is more
+/// possible by more than the tolerance, and its mark.
+std::vector<Possibility> read_possibilities(const Space&, const Archive&, const std::vector<Possibility>& known,
+                                            const Classify& = outcome_of);
 
 /// Places at the same part of the cuts of lower levels as x, from its own on outwards to that of level 0.
 std::vector<Point> make_ray(const Space&, const Point& x, int count);

@@ -132,6 +132,29 @@ TEST(PossibilityPhysics, OfADiscAtACorner) {
   EXPECT_NEAR(f.possibilities.classes[1].possibility, 1 - t, 1e-3);
 }
 
+// Classes by the value of a run instead of its outcome: a half space, a ball, either of two half spaces and both.
+TEST(PossibilityPhysics, OfOtherClassesThanOutcomes) {
+  const Space space{std::vector<FuzzyNumber>(3, make_triangular(-1, 0, 1)), {}, {}};
+  const auto judge = [&](const std::function<double(const Point&)>& value, const char* what, double possibility) {
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      PossibilityOptions options;
+      options.classify = [](const Result& r) { return r.values[0] > 0 ? 5 : 3; };
+      options.skipped = {3};
+      const Found f = find(space, make_evaluate_values([&](const Point& x) { return std::vector<double>{value(x)}; }),
+                           seed, options);
+      ASSERT_EQ(f.possibilities.classes.size(), 1u) << "the other class is left out";
+      EXPECT_EQ(f.possibilities.classes[0].outcome, 5);
+      EXPECT_NEAR(f.possibilities.classes[0].possibility, possibility, 1e-3) << what << ", seed " << seed;
+      EXPECT_TRUE(f.possibilities.classes[0].converged);
+    }
+  };
+  judge([](const Point& x) { return x[0] - 0.5 * x[1] + 0.3 * x[2] - 1.2798; }, "half space", 0.289);
+  judge([](const Point& x) { return 0.25 - std::hypot(x[0] - 0.7, x[1] + 0.2, x[2] - 0.1); }, "ball", 0.55);
+  judge([](const Point& x) { return std::max(x[0] + x[1] + x[2] - 1.2, x[0] - x[1] - 0.9); }, "one of two", 0.6);
+  // t + (t - 0.2) + t >= 1.2
+  judge([](const Point& x) { return std::min(x[0] + x[1] + x[2] - 1.2, x[0] - x[1] - 0.2); }, "both", 1 - 1.4 / 3);
+}
+
 // Valleys of every input cross in islands; the highest one, at .8210, is not that of the best spread run.
 TEST(PossibilityPhysics, OfTheHighestOfManyIslands) {
   const Space space{std::vector<FuzzyNumber>(4, make_triangular(-2, 0, 3)), {}, {}};
