@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "study/requirement.h"
 #include "study/results.h"
 #include "study/story.h"
 #include "terminal.h"
@@ -37,28 +38,55 @@ std::string words_of_percent(double percent) {
   return percent >= 9.95 ? fmt::format("{:.0f}", percent) : fmt::format("{:.2g}", percent);
 }
 
+void print_head_of_degrees(std::FILE* out, const char* title) {
+  std::fprintf(out, "\n%-27s possibility   necessity\n                               at least     at most    runs\n",
+               title);
+}
+
+/// Whether one of the two may change.
+bool print_degrees(std::FILE* out, const std::string& name, double possibility, bool is_found, double necessity,
+                   bool is_necessity_found, long runs) {
+  std::fprintf(out, "  %-26s %11s%s %9s%s %6ld\n", to_printable(name).c_str(),
+               study::words_of_least(possibility, 5).c_str(), is_found ? " " : "*",
+               study::words_of_most(necessity, 5).c_str(), is_necessity_found ? " " : "*", runs);
+  return !is_found || !is_necessity_found;
+}
+
+void print_open_degrees(std::FILE* out, bool has_open, const StudyResult& r) {
+  if (has_open && r.is_finished)
+    print_line(out, "* no search has ended there: a possibility may be higher, a necessity lower");
+}
+
 void print_outcomes(std::FILE* out, const Problem& p, const StudyResult& r) {
   if (r.alpha.classes.size() < 2 && (r.outcomes.empty() || r.outcomes[0].empty())) return;
-  std::fprintf(out,
-               "\nOutcomes                    possibility   necessity\n                               at least     at "
-               "most    runs\n");
+  print_head_of_degrees(out, "Outcomes");
   bool has_open = false;
   for (const auto& c : r.alpha.classes) {
-    const bool is_open = !study::is_possibility_converged(r, c);
-    const bool may_be_less = !uncertainty::is_necessity_converged(r.possibilities, c.outcome);
-    std::fprintf(out, "  %-26s %11s%s %9s%s %6d\n", to_printable(study::words_of_outcome(r, c.outcome)).c_str(),
-                 study::words_of_least(study::possibility_of(r, c), 5).c_str(), is_open ? "*" : " ",
-                 study::words_of_most(uncertainty::calc_necessity(r.possibilities, c.outcome), 5).c_str(),
-                 may_be_less ? "*" : " ", c.count);
-    has_open = has_open || is_open || may_be_less;
+    const bool is_open =
+        print_degrees(out, study::words_of_outcome(r, c.outcome), study::possibility_of(r, c),
+                      study::is_possibility_converged(r, c), uncertainty::calc_necessity(r.possibilities, c.outcome),
+                      uncertainty::is_necessity_converged(r.possibilities, c.outcome), c.count);
+    has_open = has_open || is_open;
   }
   for (const std::string& name : study::list_unmet_outcomes(p, r)) {
     has_open = true;
     std::fprintf(out, "  %-26s %11.5f* %9.5f  %6d   not met in %zu runs\n", name.c_str(), 0.0, 0.0, 0,
                  static_cast<std::size_t>(r.alpha.archive.size()));
   }
-  if (has_open && r.is_finished)
-    print_line(out, "* no search has ended there: a possibility may be higher, a necessity lower");
+  print_open_degrees(out, has_open, r);
+}
+
+void print_requirement(std::FILE* out, const Problem& p, const StudyResult& r) {
+  const std::vector<study::RequirementClass> classes = study::list_requirement(p, r);
+  if (classes.empty()) return;
+  print_head_of_degrees(out, "Requirement");
+  bool has_open = false;
+  for (const study::RequirementClass& c : classes) {
+    const bool is_open = print_degrees(out, c.name, c.found.possibility, c.found.converged, c.necessity,
+                                       c.is_necessity_converged, c.runs);
+    has_open = has_open || is_open;
+  }
+  print_open_degrees(out, has_open, r);
 }
 
 /// Some levels of each output; files hold all of them.
@@ -235,6 +263,7 @@ void print_study(std::FILE* out, const Problem& p, const StudyResult& r) {
   if (!sentences.empty()) std::fprintf(out, "\n");
   for (const study::Sentence& s : sentences) print_line(out, s.text);
   print_outcomes(out, p, r);
+  print_requirement(out, p, r);
   print_outputs(out, p, r);
   print_drivers(out, p, r);
   print_boxes(out, p, r);

@@ -73,6 +73,7 @@ Budget calc_budget(const Problem& p, int limit) {
     b.knowing = each >= least_knowing ? each : 0;
   }
   b.outcomes = rest;
+  b.requirement = (limit - rest) / 4;
   // possibilities take what they need of that, but for a half
   b.possibilities = rest - b.knowing * axes / 2;
   b.bounds = rest - b.knowing * axes - rest / 10;

@@ -14,6 +14,7 @@
 #include "base/error.h"
 #include "study/evaluator.h"
 #include "study/permissible.h"
+#include "study/requirement.h"
 
 namespace topple::study {
 namespace {
@@ -155,26 +156,6 @@ std::vector<std::string> list_failures(const uncertainty::Archive& archive) {
   return lines;
 }
 
-/// What the samples alone tell.
-std::vector<uncertainty::Possibility> list_possibilities(const uncertainty::Space& space,
-                                                         const uncertainty::AlphaResult& r,
-                                                         const uncertainty::Archive& archive) {
-  std::vector<uncertainty::Possibility> list;
-  for (const auto& c : r.classes) list.push_back(uncertainty::read_possibility(space, archive, c.outcome));
-  return list;
-}
-
-/// Runs behind the search of possibilities may have found more: then it has not come to its end.
-void raise_possibilities(const uncertainty::Space& space, const uncertainty::Archive& archive, StudyResult& r) {
-  constexpr double tolerance = uncertainty::PossibilityOptions{}.tolerance;
-  std::vector<uncertainty::Possibility> all = list_possibilities(space, r.alpha, archive);
-  for (uncertainty::Possibility& seen : all)
-    for (const uncertainty::Possibility& known : r.possibilities.classes)
-      if (known.outcome == seen.outcome && seen.possibility <= known.possibility + tolerance)
-        seen.resolution = known.resolution, seen.converged = known.converged || seen.converged;
-  r.possibilities.classes = std::move(all);
-}
-
 /// Whether a search for an outcome that was found with an input known has not come to its end.
 bool has_open_knowing(const Insights& in) {
   return std::any_of(in.knowing.begin(), in.knowing.end(), [](const auto& f) {
@@ -310,7 +291,10 @@ class Manager {
       }
     }
     if (!asker.is_cancelled() && !problem_.permissible.empty()) {
-      asker.set_limit(budget.limit);
+      const int before = asker.asked();
+      asker.set_limit(before + budget.requirement);
+      find_requirement(r, problem_, asker, names_.outputs, names_.outcomes);
+      asker.set_limit(budget.limit - (asker.asked() - before));
       find_boxes(r.insights, problem_, budget, asker, options.levels, names_.outputs, names_.outcomes);
     }
     asker.set_limit(budget.limit);
@@ -327,7 +311,9 @@ class Manager {
       keep_marks(r.alpha, again);
       r.alpha = std::move(again);
     }
-    raise_possibilities(problem_.space, asker.archive(), r);
+    // later runs may have found more
+    r.possibilities.classes = uncertainty::read_possibilities(problem_.space, asker.archive(), r.possibilities.classes);
+    read_requirement(r, problem_, asker.archive(), names_.outputs, names_.outcomes);
     r.ending = find_ending(r, asker);
     read_drivers(r.insights, problem_, budget, asker.archive());
     r.spread = find_spread_samples(problem_, budget, asker.archive());
@@ -387,15 +373,18 @@ class Manager {
     r.insights.knowing = uncertainty::find_outcomes_of_knowing(problem_.space, asker, o, each, r.insights.knowing);
   }
 
-  /// What was kept for others and not used up goes to searches that had to end: first to possibilities, which take what
-  /// they need, then to outcomes with an input known, the rest to bounds; and where those found a more possible run, to
-  /// possibilities again.
+  /// What was kept for others and not used up goes to searches that had to end: first to possibilities of outcomes,
+  /// which take what they need, and of the requirement, which leave three quarters to bounds, then to outcomes with an
+  /// input known, the rest to bounds; and where those found a more possible run, to possibilities again.
   void give_back(StudyResult& r, uncertainty::Asker& asker, uncertainty::AlphaSearch& search) const {
     constexpr int most_passes = 3;
     const int limit = asker.limit();
     const auto settle = [&] {
       asker.set_limit(limit);
       if (asker.can_go_on() && r.alpha.classes.size() > 1) find_possibilities(r, asker);
+      if (r.alpha.can_go_on) asker.set_limit(asker.asked() + asker.rest() / 4);
+      if (asker.can_go_on()) find_requirement(r, problem_, asker, names_.outputs, names_.outcomes);
+      asker.set_limit(limit);
     };
     settle();
     for (int pass = 1; pass <= most_passes && !r.insights.knowing.empty() && asker.can_go_on(); ++pass) {
@@ -431,9 +420,11 @@ class Manager {
   static uncertainty::Ending find_ending(const StudyResult& r, const uncertainty::Asker& asker) {
     using uncertainty::Ending;
     if (asker.is_cancelled()) return Ending::Cancelled;
-    const bool is_open = r.alpha.ending != Ending::Complete || has_open_knowing(r.insights) ||
-                         std::any_of(r.possibilities.classes.begin(), r.possibilities.classes.end(),
-                                     [](const auto& c) { return !c.converged; });
+    const bool is_open =
+        r.alpha.ending != Ending::Complete || has_open_knowing(r.insights) ||
+        std::any_of(r.possibilities.classes.begin(), r.possibilities.classes.end(),
+                    [](const auto& c) { return !c.converged; }) ||
+        std::any_of(r.requirement.begin(), r.requirement.end(), [](const auto& c) { return !c.converged; });
     if (!is_open) return Ending::Complete;
     // a search of bounds keeps a few runs for its last steps
     const bool is_cut = asker.rest() == 0 || r.alpha.ending == Ending::LimitReached;
@@ -513,18 +504,24 @@ class Manager {
     to.rounds = from.rounds, to.rechecks = from.rechecks;
   }
 
+  static json make_marks(const std::vector<uncertainty::Possibility>& possibilities) {
+    json marks = json::array();
+    for (const auto& p : possibilities)
+      marks.push_back(
+          {{"outcome", p.outcome}, {"resolution", p.resolution}, {"above", p.above}, {"converged", p.converged}});
+    return marks;
+  }
+
   /// What cannot be read off the samples.
   static json make_marks(const StudyResult& r) {
     json marks = json::object();
-    json bounds = json::array(), coverage = json::array(), classes = json::array();
+    json bounds = json::array(), coverage = json::array();
     for_each_level(r.alpha, [&](const auto& l) { bounds.push_back({l.lower.converged, l.upper.converged}); });
     for (const auto& c : r.alpha.coverage) coverage.push_back(c.space_points);
-    for (const auto& p : r.possibilities.classes)
-      classes.push_back(
-          {{"outcome", p.outcome}, {"resolution", p.resolution}, {"above", p.above}, {"converged", p.converged}});
     marks["converged"] = bounds;
     marks["space_points"] = coverage;
-    marks["classes"] = classes;
+    marks["classes"] = make_marks(r.possibilities.classes);
+    marks["requirement"] = make_marks(r.requirement);
     return marks;
   }
 
@@ -678,14 +675,19 @@ StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row
       ++k;
     });
   }
-  r.possibilities.classes = list_possibilities(problem.space, r.alpha, archive);
-  for (uncertainty::Possibility& p : r.possibilities.classes)
-    for (const json& m : marks.value("classes", json::array()))
-      if (m.at("outcome") == p.outcome) {
-        p.resolution = m.at("resolution");
-        p.above = m.at("above");
-        p.converged = m.at("converged");
-      }
+  const auto take_marks = [&marks](const char* key, std::vector<uncertainty::Possibility>& possibilities) {
+    for (uncertainty::Possibility& p : possibilities)
+      for (const json& m : marks.value(key, json::array()))
+        if (m.at("outcome") == p.outcome) {
+          p.resolution = m.at("resolution");
+          p.above = m.at("above");
+          p.converged = m.at("converged");
+        }
+  };
+  r.possibilities.classes = uncertainty::read_possibilities(problem.space, archive, {});
+  take_marks("classes", r.possibilities.classes);
+  read_requirement(r, problem, archive, names.outputs, names.outcomes);
+  take_marks("requirement", r.requirement);
   const Budget budget = calc_budget(problem, make_alpha_options(problem).limit);
   if (summary.contains("insights")) read_json(r.insights, summary["insights"]);
   read_drivers(r.insights, problem, budget, archive);

@@ -43,6 +43,7 @@ struct StudyResult {
   std::vector<std::string> outcomes;  // names of the classes 0, 1, ...
   uncertainty::AlphaResult alpha;     // with all samples
   uncertainty::PossibilityResult possibilities;
+  std::vector<uncertainty::Possibility> requirement;  // of keeping and breaking Problem::permissible, see requirement.h
   uncertainty::Ending ending = uncertainty::Ending::Cancelled;
   Confirmation confirmation;  // of a condensed model
   std::vector<int> spread;    // samples that lie over the support irrespective of results

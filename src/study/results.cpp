@@ -16,6 +16,7 @@
 #include "study/fans.h"
 #include "study/permissible.h"
 #include "study/randomness.h"
+#include "study/requirement.h"
 #include "study/story.h"
 #include "uncertainty/measures.h"
 
@@ -227,6 +228,28 @@ json fans_json(const Problem& p, const StudyResult& r) {
   return out;
 }
 
+void add_search(json& out, const uncertainty::Possibility& found) {
+  out["resolution"] = found.resolution;
+  out["converged"] = found.converged;
+  out["runs_above"] = found.above;
+}
+
+json requirement_json(const Problem& p, const StudyResult& r) {
+  const std::vector<RequirementClass> list = list_requirement(p, r);
+  if (list.empty()) return nullptr;
+  json classes = json::array();
+  for (const RequirementClass& c : list) {
+    json& one = classes.emplace_back(json{{"name", c.name},
+                                          {"runs", c.runs},
+                                          {"possibility", c.found.possibility},
+                                          {"necessity", c.necessity},
+                                          {"necessity_converged", c.is_necessity_converged},
+                                          {"sample", c.found.sample}});
+    add_search(one, c.found);
+  }
+  return {{"text", p.permissible}, {"classes", classes}};
+}
+
 json quantities_json(const std::vector<Quantity>& list) {
   json out = json::array();
   for (const Quantity& q : list) out.push_back({{"name", q.name}, {"unit", q.unit}});
@@ -332,15 +355,12 @@ json make_results_json(const Problem& p, const StudyResult& r) {
            {"necessity_converged", uncertainty::is_necessity_converged(r.possibilities, c.outcome)},
            {"sample", c.sample}};
     for (const auto& found : r.possibilities.classes)
-      if (found.outcome == c.outcome) {
-        o["resolution"] = found.resolution;
-        o["converged"] = found.converged;
-        o["runs_above"] = found.above;
-      }
+      if (found.outcome == c.outcome) add_search(o, found);
     o["outputs"] = outputs_json(p, r.outputs, c.outputs);
     out["outcomes"].push_back(o);
   }
   out["not_met"] = list_unmet_outcomes(p, r);
+  out["requirement"] = requirement_json(p, r);
   out["coverage"] = json::array();
   for (const auto& c : r.alpha.coverage)
     out["coverage"].push_back({{"alpha", c.alpha}, {"samples", c.samples}, {"spread", c.space_points}});
@@ -379,6 +399,15 @@ std::string write_outcomes_csv(const StudyResult& r) {
                         cell(possibility_of(r, c)), cell(necessity_of(r, c.outcome)), is_possibility_converged(r, c),
                         uncertainty::is_necessity_converged(r.possibilities, c.outcome));
   return text;
+}
+
+std::string write_requirement_csv(const Problem& p, const StudyResult& r) {
+  std::string text;
+  for (const RequirementClass& c : list_requirement(p, r))
+    text += fmt::format("{},{},{},{},{},{:d},{:d}\n", cell(p.permissible), c.name, c.runs, cell(c.found.possibility),
+                        cell(c.necessity), c.found.converged, c.is_necessity_converged);
+  if (text.empty()) return text;
+  return "requirement,class,runs,possibility,necessity,possibility_converged,necessity_converged\n" + text;
 }
 
 std::string write_samples_csv(const Problem& p, const StudyResult& r) {
@@ -550,6 +579,7 @@ std::vector<std::string> write_results(const std::string& folder, const Problem&
   write("results.json", write_results_json(p, r));
   write("membership.csv", write_membership_csv(p, r));
   write("outcomes.csv", write_outcomes_csv(r));
+  write("requirement.csv", write_requirement_csv(p, r));
   write("samples.csv", write_samples_csv(p, r));
   write("trajectories.csv", write_trajectories_csv(r));
   write("drivers.csv", write_drivers_csv(p, r));

@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "study/permissible.h"
 #include "study/randomness.h"
+#include "study/requirement.h"
 #include "study/results.h"
 #include "uncertainty/measures.h"
 
@@ -21,12 +22,13 @@ namespace {
 using record::Status;
 using uncertainty::failed_outcome;
 
-/// What a study gives with a mark of convergence: bounds, possibilities, and those with an input known.
+/// What a study gives with a mark of convergence: bounds, possibilities, those of a requirement and those with an input
+/// known.
 struct Marks {
   int open = 0, all = 0;
 };
 
-Marks count_marks(const StudyResult& r) {
+Marks count_marks(const Problem& p, const StudyResult& r) {
   Marks m;
   const auto add = [&m](bool is_converged) { m.open += !is_converged, ++m.all; };
   const auto add_bounds = [&add](const std::vector<uncertainty::OutputBounds>& outputs) {
@@ -38,6 +40,9 @@ Marks count_marks(const StudyResult& r) {
   add_bounds(r.alpha.outputs);
   for (const auto& c : r.alpha.classes) add_bounds(c.outputs);
   for (const auto& c : r.possibilities.classes) add(c.converged);
+  if (!is_of_outcomes(p))
+    for (const auto& c : r.requirement)
+      if (c.outcome != failed_outcome) add(c.converged);
   for (const auto& k : r.insights.knowing)
     for (const auto& c : k.classes)
       if (c.possibility > 0) add(c.converged);
@@ -310,51 +315,54 @@ void tell_splits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
   }
 }
 
-/// How possible it is that a requirement on outcomes and numbers is broken: what the runs show, failed ones among them.
+/// How possible it is that the requirement is broken, failed runs among them; where the core values break it, that it
+/// is kept.
 void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
-  if (p.permissible.empty()) return;
-  uncertainty::Requirement requirement;
-  try {
-    requirement = make_requirement(read_permissible(p.permissible, p), r.outputs, r.outcomes);
-  } catch (const InputError&) {
-    return;  // nothing has been run that has what it asks for
-  }
-  using State = uncertainty::Result::State;
-  const auto is_kept = [&](const uncertainty::Result& x) { return x.state == State::Done && requirement(x) >= 0; };
-  double broken = 0;
-  long breaking = 0;
-  const uncertainty::Sample* worst = nullptr;
-  for (const uncertainty::Sample& s : r.alpha.archive.samples()) {
-    if (s.result.state == State::NotRun || is_kept(s.result)) continue;
-    ++breaking;
-    const double degree = uncertainty::calc_membership(p.space, s.x);
-    if (degree > broken) broken = degree, worst = &s;
-  }
+  const std::vector<RequirementClass> classes = list_requirement(p, r);
+  if (classes.empty()) return;
+  const uncertainty::Sample* core = find_core(p, r.alpha.archive);
+  const bool is_core_kept = !core || make_requirement_classes(p, r.outputs, r.outcomes)(core->result) == kept_class;
   Sentence s;
   s.id = "requirement";
-  const uncertainty::Sample* core = find_core(p, r.alpha.archive);
-  if (core && !is_kept(core->result)) {
-    s.text = fmt::format("The core values break the requirement {}.", p.permissible);
-    s.status = Status::Bad;
-  } else {
-    if (core) s.text = fmt::format("The core values keep the requirement {}. ", p.permissible);
-    if (worst) {
-      s.text += fmt::format(
-          "Breaking {} is {}: possibility at least {}, so the necessity of keeping it is at most {}. It takes "
-          "no "
-          "more than {}.",
-          core ? "it" : "the requirement " + p.permissible, words_of_possibility(broken), words_of_least(broken),
-          words_of_most(1 - broken), words_of_point(p, worst->x));
-      s.status = broken >= 0.5 ? Status::Bad : Status::Warning;
-    } else if (breaking > 0) {
-      s.text += tell_impossible(core ? "Breaking it" : "Breaking the requirement " + p.permissible, breaking,
-                                r.alpha.archive.size(), false);
-      s.status = Status::Warning;
-    } else {
-      s.text += fmt::format("None of {} runs broke it.", r.alpha.archive.size());
-      s.status = Status::Good;
-    }
+  if (core)
+    s.text = is_core_kept ? fmt::format("The core values keep the requirement {}. ", p.permissible)
+                          : fmt::format("The core values break the requirement {}. ", p.permissible);
+  const std::string what = !is_core_kept ? "Keeping it"
+                           : core        ? "Breaking it"
+                                         : "Breaking the requirement " + p.permissible;
+  uncertainty::Possibility found;
+  long runs = 0;
+  bool is_searched = true;
+  for (const RequirementClass& c : classes) {
+    if ((c.found.outcome == kept_class) == is_core_kept || c.runs == 0) continue;
+    runs += c.runs;
+    is_searched = is_searched && c.found.converged;
+    if (c.found.sample >= 0 && (found.sample < 0 || c.found.possibility > found.possibility)) found = c.found;
   }
+  const std::size_t all = r.alpha.archive.size();
+  if (found.possibility > 0) {
+    const std::string word = words_of_possibility(found.possibility), least = words_of_least(found.possibility);
+    s.text += is_core_kept
+                  ? fmt::format("{} is {}: possibility at least {}, so the necessity of keeping it is at most {}.",
+                                what, word, least, words_of_most(1 - found.possibility))
+                  : fmt::format("Keeping it is {}: possibility at least {}.", word, least);
+    if (found.possibility < 1)
+      s.text += is_searched ? " A search ended there, and found nothing more possible."
+                            : " No search has ended there, so it may be higher.";
+    if (found.outcome == failed_outcome) s.text += " The run with this possibility failed.";
+    s.text += fmt::format(" It takes no more than {}.", words_of_point(p, r.alpha.archive[found.sample].x));
+  } else if (runs > 0) {
+    s.text += tell_impossible(what, runs, all, is_searched);
+  } else {
+    s.text +=
+        is_core_kept ? fmt::format("None of {} runs broke it.", all) : fmt::format("None of {} runs kept it.", all);
+  }
+  if (!is_core_kept)
+    s.status = Status::Bad;
+  else if (found.possibility > 0)
+    s.status = found.possibility >= 0.5 ? Status::Bad : Status::Warning;
+  else
+    s.status = runs > 0 ? Status::Warning : Status::Good;
   for (const std::string& name : read_permissible(p.permissible, p).outcomes)
     if (std::find(r.outcomes.begin(), r.outcomes.end(), name) == r.outcomes.end())
       s.text += fmt::format(" No run had the outcome {}.", quoted(name));
@@ -578,7 +586,7 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
         Status::Warning);
   }
   const auto add_limit = [&] {
-    const Marks marks = count_marks(r);
+    const Marks marks = count_marks(p, r);
     if (marks.open > 0)
       add("limit",
           fmt::format("All runs that were allowed are used up before every search had converged: {} of {} bounds and "
@@ -606,6 +614,14 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
 std::vector<NotableRun> list_notable_runs(const Problem& p, const StudyResult& r) {
   std::vector<NotableRun> runs;
   const uncertainty::Sample* core = find_core(p, r.alpha.archive);
+  if (!is_of_outcomes(p))
+    for (const RequirementClass& c : list_requirement(p, r))
+      if (c.found.sample >= 0 && c.found.possibility < 1 && c.found.outcome != failed_outcome)
+        runs.push_back(
+            {c.found.sample, fmt::format(fmt::runtime(c.found.outcome == kept_class
+                                                          ? "most possible run that keeps the requirement ({})"
+                                                          : "most possible run that breaks the requirement ({})"),
+                                         words_of_least(c.found.possibility))});
   for (const auto& c : r.possibilities.classes)
     if (c.sample >= 0 && (!core || uncertainty::outcome_of(core->result) != c.outcome))
       runs.push_back({c.sample, fmt::format("most possible run with the outcome {} ({})",

@@ -74,6 +74,7 @@ TEST(Budget, SharesRunsOutAndNeverPassesTheLimit) {
         EXPECT_EQ(b.possibilities + b.knowing, b.outcomes);
         EXPECT_LE(b.outcomes, b.limit);
         EXPECT_EQ(b.outcomes == b.limit, !has_boxes);
+        EXPECT_LE(b.outcomes + 3 * b.requirement, b.limit) << "boxes keep most of theirs";
         EXPECT_EQ(b.rows + b.spread + b.knowing > 0, has_drivers);
         EXPECT_GT(b.bounds, limit / 4);
       }
@@ -714,13 +715,13 @@ TEST(Results, ReplaceThoseOfEarlierSettings) {
   const auto list_written = [&](const char* store) {
     return write_results(there, p, run(p, folder, store, make_small_factories()));
   };
-  EXPECT_EQ(list_written("a").size(), 6u);
-  EXPECT_TRUE(exists("boxes.csv") && exists("drivers.csv"));
+  EXPECT_EQ(list_written("a").size(), 7u);
+  EXPECT_TRUE(exists("boxes.csv") && exists("drivers.csv") && exists("requirement.csv"));
   std::ofstream(there + "/mine.csv") << "1\n";
   p.permissible.clear();
   p.has_drivers = false;
   EXPECT_EQ(list_written("b").size(), 4u);
-  EXPECT_FALSE(exists("boxes.csv") || exists("drivers.csv"));
+  EXPECT_FALSE(exists("boxes.csv") || exists("drivers.csv") || exists("requirement.csv"));
   EXPECT_TRUE(exists("mine.csv") && exists("results.json"));
 }
 

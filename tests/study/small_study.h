@@ -65,6 +65,7 @@ inline std::string write_bits(const StudyResult& r) {
     add(c.possibility), add_bounds(c.outputs);
   }
   for (const auto& p : r.possibilities.classes) add(p.possibility);
+  for (const auto& p : r.requirement) add(p.possibility), add(p.resolution), text += p.converged ? "c" : "o";
   for (const auto& s : r.alpha.archive.samples()) {
     for (const double x : s.x) add(x);
     for (const double y : s.result.values) add(y);

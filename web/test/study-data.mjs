@@ -46,6 +46,7 @@ export function makeStudy(count = 60) {
     format: "topple-study", version: 1, title: "Storehouse, fuzzy (synthetic)", state: "finished", ending: "complete", asked: "topple",
     verdict: [
       { id: "verdict", status: "warning", text: "With the core values the outcome is \"topple\", as planned. It is not certain: another outcome is possible (possibility at least 0.47), so its necessity is at most 0.53." },
+      { id: "requirement", status: "warning", text: "The core values keep the requirement topple, reach <= 10. Breaking it is possible: possibility at least 0.47, so the necessity of keeping it is at most 0.53. No search has ended there, so it may be higher. It takes no more than fc 18 N/mm2 (core 25)." },
       { id: "outcome.vertical", status: "warning", text: `"vertical" is possible: possibility at least 0.47, necessity at most 0.00. It takes no more than ${hostile} 18 N/mm2 (core 25).` },
       { id: "failed", status: "warning", text: `1 of ${count} runs failed; they are an outcome of their own, possible to at least 0.20. What would have happened there is not known.` },
     ],
@@ -56,8 +57,16 @@ export function makeStudy(count = 60) {
       { name: "vertical", is_failure: false, runs: 14, possibility: 0.47, necessity: 0, sample: 3, outputs: partOf(-5, -3) },
     ],
     not_met: ["partial", "stands"],
+    requirement: {
+      text: "topple, reach <= 10",
+      classes: [
+        { name: "kept", runs: 40, possibility: 1, necessity: 0.53, necessity_converged: false, sample: 0, resolution: 0, converged: true, runs_above: 0 },
+        { name: "broken", runs: 19, possibility: 0.47, necessity: 0, necessity_converged: true, sample: 3, resolution: 1e-4, converged: false, runs_above: 9 },
+        { name: "failed", runs: 1, possibility: 0.2, necessity: 0, necessity_converged: true, sample: count - 1, resolution: 0.1, converged: false, runs_above: 20 },
+      ],
+    },
     coverage: alphas.map((alpha) => ({ alpha, samples: 30, spread: 10 })), failures: [`1 x ${hostile}`],
-    notable: [{ sample: 3, why: "most possible run with the outcome vertical (0.47)" }, { sample: count - 1, why: "failed" }],
+    notable: [{ sample: 3, why: "most possible run with the outcome vertical (0.47)" }, { sample: 3, why: "most possible run that breaks the requirement (0.47)" }, { sample: count - 1, why: "failed" }],
     drivers: {
       from: "spread runs", runs: 40,
       outputs: [{ name: "tilt_1.7", inputs: [driver(0.83, 0.06, [1, 1], 0.9), driver(0.02, 0.09, [2, 2], 0.1)] }],
@@ -113,7 +122,7 @@ export function makeEmptyStudy() {
   const study = makeStudy(2);
   return {
     ...study, title: "", state: "open", ending: "cancelled", asked: "", verdict: [{ id: "verdict", status: "info", text: "Nothing has been run so far." }], runs: 0, failed: 0,
-    outputs: [], outcomes: [], coverage: [], failures: [], notable: [], drivers: { from: "nothing", runs: 0, outputs: [], outcomes: [] }, known: [], boxes: null,
+    outputs: [], outcomes: [], coverage: [], failures: [], notable: [], drivers: { from: "nothing", runs: 0, outputs: [], outcomes: [] }, known: [], boxes: null, requirement: null,
     curves: [], fans: [], debris: [], site: { footprint: [], neighbours: [] }, not_modelled: [],
     run_table: { sample: [], inputs: [], derived: [], outputs: [], membership: [], outcome: [], failure: {}, points: 0, trajectories: "" },
   };
@@ -124,7 +133,7 @@ export function makePlainStudy() {
   const study = makeStudy(20);
   const count = study.run_table.sample.length;
   return {
-    ...study, not_met: [], asked: "", failed: 0, outcomes: [{ ...study.outcomes[1], name: "", runs: count, possibility: 1, necessity: 1 }], failures: [], notable: [], known: [], boxes: null,
+    ...study, not_met: [], asked: "", failed: 0, outcomes: [{ ...study.outcomes[1], name: "", runs: count, possibility: 1, necessity: 1 }], failures: [], notable: [], known: [], boxes: null, requirement: null,
     drivers: { ...study.drivers, outcomes: [] }, curves: [], fans: [], debris: [], site: { footprint: [], neighbours: [] }, not_modelled: [],
     run_table: { ...study.run_table, outcome: study.run_table.outcome.map(() => 0), failure: {}, points: 0, trajectories: "" },
   };

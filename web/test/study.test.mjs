@@ -92,7 +92,7 @@ describe("the page of a study", () => {
   it("says its verdict, and how possible each outcome is", async () => {
     assert.equal(await page.textContent("[data-test=verdict]"), prettify(data.verdict[0].text));
     for (const s of data.verdict.slice(1)) assert.ok((await page.textContent(".sentences")).includes(prettify(s.text)), s.id);
-    const rows = await page.$$eval(".outcomes tbody tr", (list) => list.map((e) => e.textContent));
+    const rows = await page.$$eval("[aria-label=Outcomes] .outcomes tbody tr", (list) => list.map((e) => e.textContent));
     const unmet = data.not_met ?? [];
     assert.equal(rows.length, data.outcomes.length + unmet.length);
     unmet.forEach((name, i) => assert.equal(rows[data.outcomes.length + i], `${name}not met in ${data.runs} runs≥ 0*00`));
@@ -170,6 +170,18 @@ describe("the page of a study", () => {
     for (const state of ["confirmed", "exceeded", "not reached"])
       assert.ok(text.includes(`${c.bounds.filter((b) => b.state === state).length} ${state}`), text);
     assert.equal(await page.locator("[data-test=confirmation] details tbody tr").count(), c.bounds.length);
+  });
+
+  it("shows how possible it is that the requirement is broken", async () => {
+    if (data.requirement === null) return;
+    const text = await page.textContent("[data-test=requirement]");
+    assert.ok(text.includes(data.requirement.text));
+    for (const c of data.requirement.classes) {
+      const row = await page.textContent(`[data-test=requirement] [data-class=${c.name}]`);
+      const least = /^[^\d]*([\d.]+)(\*?)/.exec(row);
+      assert.ok(Number(least[1]) <= c.possibility && Number(least[1]) > c.possibility - 1e-3, row);
+      assert.equal(least[2] === "*", !c.converged, row);
+    }
   });
 
   it("shows permissible boxes with what is known of them", async () => {
@@ -299,7 +311,7 @@ describe("unusual studies", () => {
 
   it("shows a model with one outcome that has no name", async () => {
     const { page, problems, close } = await open("study-plain", makePlainStudy());
-    assert.equal(await page.locator(".outcomes tbody tr").count(), 1);
+    assert.equal(await page.locator("[aria-label=Outcomes] .outcomes tbody tr").count(), 1);
     assert.equal(await page.locator("[data-fan]").count(), 0);
     assert.deepEqual(problems, []);
     await close();

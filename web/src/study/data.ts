@@ -26,6 +26,15 @@ export interface Outcome {
   necessity_converged?: boolean;
   outputs: Output[];
 }
+/// Runs that keep what is asked for, break it, or failed.
+export interface RequirementClass {
+  name: string; // kept, broken, failed
+  runs: number;
+  possibility: number;
+  necessity: number;
+  converged: boolean;
+  necessity_converged: boolean;
+}
 export interface Input {
   name: string;
   label: string; // short name
@@ -109,6 +118,7 @@ export interface Study {
   outputs: Output[];
   outcomes: Outcome[];
   not_met?: string[]; // classes that the model knows and no run has had; not known of old studies
+  requirement?: { text: string; classes: RequirementClass[] } | null; // not known of old studies
   coverage: { alpha: number; samples: number; spread: number }[];
   failures: string[];
   notable: { sample: number; why: string }[];

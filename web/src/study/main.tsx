@@ -5,7 +5,7 @@ import { DebrisPlan, Fans, Memberships } from "./plots";
 import { Runs } from "./runs";
 import { makeState } from "./state";
 import { Boxes, Confirmed, Drivers, Inputs, NotModelled, Notable, Origin } from "./tables";
-import { Header, Outcomes } from "./verdict";
+import { Header, Outcomes, Requirement } from "./verdict";
 import { localiseStudy } from "../localise";
 import { startPage } from "../start";
 import { say, translateElements } from "../translate";
@@ -18,6 +18,7 @@ function Page(props: { study: Study }) {
       <main class="study">
         <div class="pair">
           <Outcomes state={state} />
+          <Requirement state={state} />
           <Inputs study={props.study} />
         </div>
         <div class="pair">

@@ -49,25 +49,87 @@ export function OutcomeName(props: { study: Study; index: number }) {
   );
 }
 
+interface Degrees {
+  runs: number;
+  possibility: number;
+  necessity: number;
+  converged?: boolean;
+  necessity_converged?: boolean;
+}
+const isOpen = (d: Degrees): boolean => d.converged === false || d.necessity_converged === false;
+
+function DegreeHead(props: { of: string }) {
+  return (
+    <thead>
+      <tr>
+        <th scope="col">{props.of}</th>
+        <th scope="col" class="wide">possibility, and as a narrow bar what is necessary</th>
+        <th scope="col">possibility</th>
+        <th scope="col">necessity</th>
+        <th scope="col">runs</th>
+      </tr>
+    </thead>
+  );
+}
+
+/// The cells of a row, behind its name.
+function DegreeCells(props: { of: Degrees; colour: string }) {
+  const { of, colour } = props;
+  const wide = (part: number): string => `${(100 * Math.min(1, Math.max(0, part))).toFixed(1)}%`;
+  return (
+    <>
+      <td>
+        <span class="degree" aria-hidden="true">
+          <i style={{ width: wide(of.possibility), background: colour }} />
+          <b style={{ width: wide(of.necessity) }} />
+        </span>
+      </td>
+      <td>{atLeast(of.possibility, 3) + (of.converged === false ? "*" : "")}</td>
+      <td>{atMost(of.necessity, 3) + (of.necessity_converged === false ? "*" : "")}</td>
+      <td>{of.runs}</td>
+    </>
+  );
+}
+
+function OpenDegrees() {
+  return <p class="quiet">* No search has ended there: a possibility may be higher, a necessity lower.</p>;
+}
+
+/// How possible it is that the requirement is kept, and that it is broken.
+export function Requirement(props: { state: State }) {
+  const { requirement } = props.state.study;
+  if (requirement === undefined || requirement === null) return null;
+  const looks: Record<string, [string, string]> = { kept: ["requirement kept", "var(--good)"], broken: ["requirement broken", "var(--bad)"] };
+  return (
+    <section class="panel" aria-label="Requirement" data-test="requirement">
+      <h2>Requirement</h2>
+      <p>Asked: <strong>{requirement.text}</strong></p>
+      <table class="outcomes">
+        <DegreeHead of="runs" />
+        <tbody>
+          {requirement.classes.map((c) => (
+            <tr data-class={c.name}>
+              <th scope="row">{looks[c.name]?.[0] ?? c.name}</th>
+              <DegreeCells of={c} colour={looks[c.name]?.[1] ?? "var(--broken)"} />
+            </tr>
+          ))}
+        </tbody>
+      </table>
+      {requirement.classes.some(isOpen) && <OpenDegrees />}
+    </section>
+  );
+}
+
 /// How possible and how necessary each outcome is.
 export function Outcomes(props: { state: State }) {
   const { study } = props.state;
   if (study.outcomes.length === 0) return null;
   const unmet = study.not_met ?? [];
-  const wide = (part: number): string => `${(100 * Math.min(1, Math.max(0, part))).toFixed(1)}%`;
   return (
     <section class="panel" aria-label="Outcomes">
       <h2>Outcomes</h2>
       <table class="outcomes">
-        <thead>
-          <tr>
-            <th scope="col">outcome</th>
-            <th scope="col" class="wide">possibility, and as a narrow bar what is necessary</th>
-            <th scope="col">possibility</th>
-            <th scope="col">necessity</th>
-            <th scope="col">runs</th>
-          </tr>
-        </thead>
+        <DegreeHead of="outcome" />
         <tbody>
           {study.outcomes.map((o, i) => (
             <tr data-outcome={o.name}>
@@ -75,15 +137,7 @@ export function Outcomes(props: { state: State }) {
                 <OutcomeName study={study} index={i} />
                 {o.name !== "" && o.name === study.asked && <span class="quiet"> (planned)</span>}
               </th>
-              <td>
-                <span class="degree" aria-hidden="true">
-                  <i style={{ width: wide(o.possibility), background: lookOf(study.outcomes, i).colour }} />
-                  <b style={{ width: wide(o.necessity) }} />
-                </span>
-              </td>
-              <td>{atLeast(o.possibility, 3) + (o.converged === false ? "*" : "")}</td>
-              <td>{atMost(o.necessity, 3) + (o.necessity_converged === false ? "*" : "")}</td>
-              <td>{o.runs}</td>
+              <DegreeCells of={o} colour={lookOf(study.outcomes, i).colour} />
             </tr>
           ))}
           {unmet.map((name) => (
@@ -97,8 +151,7 @@ export function Outcomes(props: { state: State }) {
           ))}
         </tbody>
       </table>
-      {(unmet.length > 0 || study.outcomes.some((o) => o.converged === false || o.necessity_converged === false)) &&
-        <p class="quiet">* No search has ended there: a possibility may be higher, a necessity lower.</p>}
+      {(unmet.length > 0 || study.outcomes.some(isOpen)) && <OpenDegrees />}
       <p class="quiet plot-note">
         Possibility is the highest degree at which inputs were found that lead to the outcome; it can only be higher. Necessity is what is left
         for no other outcome. Numbers of runs are no probabilities: runs gather where something was looked for.
