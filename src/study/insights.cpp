@@ -181,15 +181,14 @@ void find_boxes(Insights& out, const Problem& p, const Budget& b, uncertainty::A
   out.has_boxes = true;
 }
 
-void review_boxes(Insights& in, const Problem& p, const uncertainty::Archive& archive,
-                  const std::vector<double>& levels, const std::vector<std::string>& outputs,
-                  const std::vector<std::string>& outcomes) {
+void finish_boxes(Insights& in, const Problem& p, uncertainty::Asker& asker, const std::vector<double>& levels,
+                  const std::vector<std::string>& outputs, const std::vector<std::string>& outcomes) {
   if (!in.has_boxes) return;
   uncertainty::DesignOptions o;
   o.levels = levels;
   o.seed = p.seed;
   const uncertainty::Requirement requirement = make_requirement(read_permissible(p.permissible, p), outputs, outcomes);
-  uncertainty::review_boxes(p.space, in.boxes.boxes, requirement, archive, o);
+  uncertainty::analyse_on(p.space, in.boxes.boxes, requirement, asker, o);
 }
 
 bool is_share_known(const uncertainty::Driver& d) { return d.first > d.first_error; }

@@ -46,8 +46,9 @@ void read_drivers(Insights&, const Problem&, const Budget&, const uncertainty::A
 /// Boxes that keep Problem::permissible. Throws InputError E825.
 void find_boxes(Insights&, const Problem&, const Budget&, uncertainty::Asker&, const std::vector<double>& levels,
                 const std::vector<std::string>& outputs, const std::vector<std::string>& outcomes);
-/// By all runs there are now: those behind the search of boxes may have met something inside.
-void review_boxes(Insights&, const Problem&, const uncertainty::Archive&, const std::vector<double>& levels,
+/// By all runs there are now: those behind the search of boxes may have met something inside. What is left goes to
+/// bounds inside of boxes whose searches have not ended.
+void finish_boxes(Insights&, const Problem&, uncertainty::Asker&, const std::vector<double>& levels,
                   const std::vector<std::string>& outputs, const std::vector<std::string>& outcomes);
 
 /// Whether a share is larger than its standard error; else nothing is known but that it is small or hidden.

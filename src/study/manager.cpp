@@ -300,7 +300,7 @@ class Manager {
     asker.set_limit(budget.limit);
     give_back(r, asker, search);
     if (problem_.permissible.empty()) look_further(r, asker, search);
-    review_boxes(r.insights, problem_, asker.archive(), options.levels, names_.outputs, names_.outcomes);
+    finish_boxes(r.insights, problem_, asker, options.levels, names_.outputs, names_.outcomes);
     if (asker.asked() > asked_by_bounds || has_classes()) {
       // further runs may have moved bounds
       std::vector<int> space_points;

@@ -59,6 +59,24 @@ Space make_inner(const Space& space, const std::vector<FuzzyNumber>& inputs) {
   return inner;
 }
 
+/// The box as fuzzy input, with at most so many runs.
+void analyse(const Space& space, Asker& asker, const DesignOptions& options, PermissibleBox& b, int runs) {
+  const Space inner = make_inner(space, b.inputs);
+  AlphaOptions o = make_thrifty_options();
+  o.levels = options.levels;
+  o.seed = options.seed;
+  const int limit = asker.limit();
+  asker.set_limit(std::min(limit, asker.asked() + runs));
+  b.outputs = optimise(inner, asker, o).outputs;
+  asker.set_limit(limit);
+}
+
+bool has_open_bounds(const PermissibleBox& b) {
+  return std::ranges::any_of(b.outputs, [](const OutputBounds& o) {
+    return std::ranges::any_of(o.levels, [](const LevelBounds& l) { return !l.lower.converged || !l.upper.converged; });
+  });
+}
+
 class Design {
  public:
   Design(const Space& space, Asker& asker, const Requirement& requirement, const DesignOptions& options)
@@ -235,7 +253,7 @@ class Design {
       b.fresh_points = fresh;
       b.fresh = static_cast<int>(fresh.size());
       b.inputs = make_inputs(b.box, middle);
-      if (options_.rerun_limit > 0) rerun(b, options_.rerun_limit);
+      if (options_.rerun_limit > 0) analyse(space_, asker_, options_, b, options_.rerun_limit);
       b.kept = !has_violation(b.box) && !asker_.is_cancelled();
       if (!asker_.can_go_on()) break;
     }
@@ -304,7 +322,8 @@ class Design {
       b.fresh = static_cast<int>(b.fresh_points.size());
       b.inputs = make_inputs(b.box, middle);
       // half of what is left, so that another box can be tried if the analysis finds a violation
-      if (options_.rerun_limit > 0) rerun(b, std::min(options_.rerun_limit, asker_.rest() / 2));
+      if (options_.rerun_limit > 0)
+        analyse(space_, asker_, options_, b, std::min(options_.rerun_limit, asker_.rest() / 2));
       b.kept = !has_violation(b.box) && !asker_.is_cancelled();
       if (!b.kept) broken = b;
     }
@@ -432,18 +451,6 @@ class Design {
     for (int i = 0; i < asker_.asked(); ++i)
       if (box.contains(asker_.archive()[i].x) && is_violating(i)) return true;
     return false;
-  }
-
-  /// The box as fuzzy input, with at most so many runs.
-  void rerun(PermissibleBox& b, int runs) {
-    const Space inner = make_inner(space_, b.inputs);
-    AlphaOptions o = make_thrifty_options();
-    o.levels = options_.levels;
-    o.seed = options_.seed;
-    const int limit = asker_.limit();
-    asker_.set_limit(std::min(limit, asker_.asked() + runs));
-    b.outputs = optimise(inner, asker_, o).outputs;
-    asker_.set_limit(limit);
   }
 
   const Space& space_;
@@ -580,6 +587,21 @@ void review_boxes(const Space& space, std::vector<PermissibleBox>& boxes, const 
   std::vector<PermissibleBox> ordered;
   for (const auto& [places, k] : order) ordered.push_back(std::move(boxes[k]));
   boxes = std::move(ordered);
+}
+
+void analyse_on(const Space& space, std::vector<PermissibleBox>& boxes, const Requirement& requirement, Asker& asker,
+                const DesignOptions& options) {
+  constexpr int turns = 3;  // as long as runs inside violate
+  review_boxes(space, boxes, requirement, asker.archive(), options);
+  for (int turn = 0; turn < turns && asker.can_go_on(); ++turn) {
+    const int before = asker.asked();
+    const auto is_open = [](const PermissibleBox& b) { return b.kept && has_open_bounds(b); };
+    auto open = std::ranges::count_if(boxes, is_open);
+    for (PermissibleBox& b : boxes)
+      if (is_open(b)) analyse(space, asker, options, b, asker.rest() / static_cast<int>(open--));
+    if (asker.asked() == before) break;
+    review_boxes(space, boxes, requirement, asker.archive(), options);
+  }
 }
 
 double calc_smallest(double smallest, const Box& box) {

@@ -72,6 +72,9 @@ struct DesignResult {
 ///   options  edge, smallest, confidence, ranking_output, levels, seed
 void review_boxes(const Space&, std::vector<PermissibleBox>&, const Requirement&, const Archive&, const DesignOptions&);
 
+/// The same, and bounds of outputs in boxes whose searches have not ended are searched for on, as far as runs are left.
+void analyse_on(const Space&, std::vector<PermissibleBox>&, const Requirement&, Asker&, const DesignOptions&);
+
 /// Uses and fills the asker's archive. Throws InputError E804 (space), E809 (options out of range).
 DesignResult find_permissible_boxes(const Space&, Asker&, const Requirement&, const DesignOptions&);
 

@@ -295,6 +295,13 @@ TEST(InsightsReference, BoxOfTheJump) {
   EXPECT_EQ(b.fresh, 149);
   EXPECT_NEAR(b.violating, 1 - std::pow(0.05 / b.tries, 1.0 / 149), 1e-12);
   EXPECT_NE(tell_guarantee(b).find("not proven"), std::string::npos);
+  // the largest value lies where both inputs are largest; what is left of the runs settles bounds inside
+  ASSERT_EQ(b.outputs.size(), 1u);
+  for (const uncertainty::LevelBounds& l : b.outputs[0].levels) {
+    EXPECT_TRUE(l.lower.converged) << l.alpha;
+    EXPECT_TRUE(l.upper.converged) << l.alpha;
+  }
+  EXPECT_NEAR(b.outputs[0].levels[0].lower.value, b.box.lower[0] * b.box.lower[1] / 100 - 8, 1e-9);
 }
 
 TEST(InsightsReplay, AreReadBackWithTheSameBits) {
