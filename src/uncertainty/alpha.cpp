@@ -615,7 +615,10 @@ class Optimisation {
         end = std::min(end, r.search->value());
       }
       const auto* model = dynamic_cast<const ModelSearch*>(r.search.get());
-      if (model) model->is_at_jump() ? jumps_[r.goal.output].add(model->get_side()) : note_planes(*model);
+      if (model && model->is_at_jump())
+        jumps_[r.goal.output].add(model->get_side());
+      else if (model)
+        note_planes(*model);
       if (!r.search->is_converged()) continue;
       if (dynamic_cast<const LineSearch*>(r.search.get()) != nullptr) {
         if (const int at = asker_.archive().find(r.search->best()); at >= 0) scanned_[key_of(r.goal)].push_back(at);
@@ -654,8 +657,8 @@ class Optimisation {
     std::vector<Point> points;
     for (auto& [output, jumps] : jumps_)
       for (const JumpSide& side : jumps.take_new())
-        for (const double alpha : levels_)
-          for (Point& x : find_places(space_, alpha, side)) points.push_back(std::move(x));
+        for (const Region& r : regions_)
+          for (Point& x : find_places(r, side)) points.push_back(std::move(x));
     if (!points.empty()) ask(points);
   }
 

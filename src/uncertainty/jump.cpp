@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "uncertainty/cut_program.h"
+#include "uncertainty/local_search.h"
 
 namespace topple::uncertainty {
 namespace {
@@ -43,12 +44,10 @@ bool is_alike(const JumpSide& a, const JumpSide& b) {
 
 }  // namespace
 
-std::vector<Point> find_places(const Space& space, double alpha, const JumpSide& side) {
-  const std::vector<double> scale = calc_scale(space);
-  const Box box = make_box(space, alpha);
-  std::vector<int> axes;
-  for (int i = 0; i < space.size(); ++i)
-    if (box.upper[i] > box.lower[i]) axes.push_back(i);
+std::vector<Point> find_places(const Region& region, const JumpSide& side) {
+  const Space& space = *region.space;
+  const std::vector<double>& scale = region.scale;
+  const std::vector<int>& axes = region.axes;
   if (axes != side.axes || side.in.empty()) return {};
   const std::size_t n = axes.size();
   const Point centre = calc_centre(space);
@@ -64,7 +63,7 @@ std::vector<Point> find_places(const Space& space, double alpha, const JumpSide&
   };
   const std::vector<double> none(n * n, 0.0);
   if (space.has_interaction()) {
-    CutProgram cut(space, alpha, scale, axes);
+    CutProgram cut(space, region.alpha, scale, axes);
     std::vector<double> out(n, 0.0);
     for (const HalfSpace& h : side.in)
       for (std::size_t k = 0; k < n; ++k) out[k] += h.a[k];
@@ -77,10 +76,11 @@ std::vector<Point> find_places(const Space& space, double alpha, const JumpSide&
   const auto to_place = [&](const std::vector<double>& v) {
     Point x = centre;
     for (std::size_t k = 0; k < n; ++k) x[axes[k]] = v[k] * scale[axes[k]];
-    return clip(box, std::move(x));
+    return clip(region.box, std::move(x));
   };
   // the least excess over all planes
-  std::vector<double> lower = to_widths(box.lower), upper = to_widths(box.upper), start = to_widths(centre);
+  std::vector<double> lower = to_widths(region.box.lower), upper = to_widths(region.box.upper),
+                      start = to_widths(centre);
   std::vector<HalfSpace> planes = side.in;
   double excess = 0;
   for (HalfSpace& h : planes) {

@@ -3,10 +3,12 @@
 
 #include <vector>
 
-#include "uncertainty/boundary.h"
 #include "uncertainty/space.h"
+#include "uncertainty/tangent.h"
 
 namespace topple::uncertainty {
+
+struct Region;
 
 /// The side of a jump on which a search ended.
 struct JumpSide {
@@ -17,7 +19,7 @@ struct JumpSide {
 
 /// Places of a cut that tell whether it reaches such a side, and what there is best: the deepest one, and the best one
 /// if planes and slopes go on as they are. None where the cut ends before, or other inputs vary. They cost no runs.
-std::vector<Point> find_places(const Space&, double alpha, const JumpSide&);
+std::vector<Point> find_places(const Region&, const JumpSide&);
 
 /// What is known of the jumps of one output.
 class Jumps {

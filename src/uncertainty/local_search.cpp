@@ -637,7 +637,7 @@ void ModelSearch::finish_iteration() {
                  (along_ < 0.05 && !boundary_.has_edges());
     at_edge_ = !settled || is_bent();
     pending_.clear();
-    ask_section((settled ? 1e5 : 100) * options_.tolerance);
+    look_for_jump((settled ? 1e5 : 100) * options_.tolerance);
     return;
   }
   const bool good = gained > 0 && gained >= 0.5 * promised_;
@@ -675,21 +675,25 @@ std::vector<Told> ModelSearch::split_at_jump(std::span<const Told> told) const {
 }
 
 /// Looks for a jump, or another one, between the best point and the worst place near it, if that is worse by `least`.
-bool ModelSearch::ask_section(double least) {
-  if (jumps_ >= most_jumps || axes_.size() < 2) return false;
+void ModelSearch::look_for_jump(double least) {
+  if (jumps_ >= most_jumps || axes_.size() < 2) return;
   const Place* worst = nullptr;
   for (const Place& p : insides_)
     if (boundary_.calc_offset(p.x, best_) <= 2 * radius_ && std::isfinite(p.value) &&
         (worst == nullptr || p.value > worst->value))
       worst = &p;
-  if (worst == nullptr || worst->value - value_ < least) return false;
+  if (worst == nullptr || worst->value - value_ < least) return;
   near_ = {best_, value_}, far_ = *worst;
   rise_ = far_.value - near_.value, section_ = 0;
+  pending_ = {calc_middle()};
+  stage_ = Stage::Section;
+}
+
+/// Of the way on which a jump is looked for.
+Point ModelSearch::calc_middle() const {
   Point x = near_.x;
   for (const Axis& axis : axes_) x[axis.input] += 0.5 * (far_.x[axis.input] - x[axis.input]);
-  pending_ = {std::move(x)};
-  stage_ = Stage::Section;
-  return true;
+  return x;
 }
 
 /// A jump stays as high, however near its places are; a slope does not.
@@ -705,8 +709,7 @@ void ModelSearch::read_section(const Told& told) {
     stay_before_jump();
     return;
   }
-  Point middle = near_.x;
-  for (const Axis& axis : axes_) middle[axis.input] += 0.5 * (far_.x[axis.input] - middle[axis.input]);
+  Point middle = calc_middle();
   if (middle != near_.x && middle != far_.x) pending_ = {std::move(middle)};
 }
 
@@ -760,8 +763,11 @@ void ModelSearch::conclude_star() {
   if (jump_ > 0) {
     side_.at = {best_, value_}, side_.hessian = hessian_;
     // where the star saw nothing of this side slopes stay as they were
-    for (std::size_t k = 0; k < axes_.size(); ++k)
-      axes_[k].known || axes_[k].slope != 0 ? side_.slope[k] = axes_[k].slope : axes_[k].slope = side_.slope[k];
+    for (std::size_t k = 0; k < axes_.size(); ++k) {
+      Axis& axis = axes_[k];
+      if (!axis.known && axis.slope == 0) axis.slope = side_.slope[k];
+      side_.slope[k] = axis.slope;
+    }
   }
   if (widen_star())
     ask_star();

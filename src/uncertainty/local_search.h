@@ -87,6 +87,7 @@ class ModelSearch : public LocalSearch {
   bool has_met_walls() const { return has_met_walls_; }
   /// Whether its boundary is that of a jump of the value, of which outcomes do not tell.
   bool is_at_jump() const { return jump_ > 0; }
+  /// Where that is, and what is known of it: planes and slopes about the best point.
   JumpSide get_side() const;
 
  private:
@@ -137,7 +138,8 @@ class ModelSearch : public LocalSearch {
   void find_allowed_step(std::vector<double>& step);
   bool is_beyond(const Point&, double value) const;
   std::vector<Told> split_at_jump(std::span<const Told> told) const;
-  bool ask_section(double least);
+  void look_for_jump(double least);
+  Point calc_middle() const;
   void read_section(const Told& told);
   void stay_before_jump();
   bool widen_star();

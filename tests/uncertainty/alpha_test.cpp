@@ -802,17 +802,20 @@ TEST(AlphaOfClasses, FollowsAThinClass) {
   }
 }
 
+AlphaResult optimise_with(std::uint64_t seed, const Evaluate& model) {
+  AlphaOptions options;
+  options.seed = seed;
+  return optimise(std::vector(3, make_triangular(0, .5, 1)), model, options, {});
+}
+
 // What no outcome tells: a worse value behind an oblique plane, two of them of different heights, and a piece that the
 // cut of a level only just reaches.
 TEST(AlphaAtJumps, FollowsAPlane) {
   const Evaluate model = make_evaluate_values([](const Point& x) {
     return std::vector{x[0] + .6 * x[1] - .3 * x[2] - (2 * x[0] + x[1] + 2 * x[2] > 2.2 ? 1 : 0)};
   });
-  const std::vector<FuzzyNumber> inputs(3, make_triangular(0, .5, 1));
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    AlphaOptions options;
-    options.seed = seed;
-    const AlphaResult r = optimise(inputs, model, options, {});
+    const AlphaResult r = optimise_with(seed, model);
     // the least x2, the largest x1, and of x0 what the plane leaves
     for (const LevelBounds& l : r.outputs[0].levels) {
       const double low = .5 * l.alpha, high = 1 - low;
@@ -828,11 +831,8 @@ TEST(AlphaAtJumps, FollowsAnEdgeOfTwo) {
     return std::vector{x[0] + x[1] + .2 * x[2] - (x[0] + 2 * x[1] + x[2] > 2 ? 1 : 0) -
                        (2 * x[0] + x[1] + x[2] > 1.9 ? .5 : 0)};
   });
-  const std::vector<FuzzyNumber> inputs(3, make_triangular(0, .5, 1));
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    AlphaOptions options;
-    options.seed = seed;
-    const AlphaResult r = optimise(inputs, model, options, {});
+    const AlphaResult r = optimise_with(seed, model);
     // where both planes meet, down to the least x2
     for (const LevelBounds& l : r.outputs[0].levels) {
       if (l.alpha == 1) continue;
@@ -847,11 +847,8 @@ TEST(AlphaAtJumps, FollowsAPlaneThroughNoise) {
     return std::vector{.4 * x[0] + .2 * x[1] - .12 * x[2] - (x[0] + .8 * x[1] + .6 * x[2] >= 1.5 ? .3 : 0) +
                        1e-4 * (2 * wild - 1)};
   });
-  const std::vector<FuzzyNumber> inputs(3, make_triangular(0, .5, 1));
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    AlphaOptions options;
-    options.seed = seed;
-    const AlphaResult r = optimise(inputs, model, options, {});
+    const AlphaResult r = optimise_with(seed, model);
     // behind the plane, at the largest x1 and x2
     for (const int k : {0, 1, 2}) {
       const LevelBounds& l = r.outputs[0].levels[static_cast<std::size_t>(k)];
@@ -865,11 +862,8 @@ TEST(AlphaAtJumps, SeesAPieceThatALevelJustReaches) {
   // at the level 0.5 the corner 0.75, 0.75, 0.75 lies 0.03 beyond the plane
   const Evaluate model = make_evaluate_values(
       [](const Point& x) { return std::vector{-x[0] - x[1] + (.6 * x[0] + .64 * x[1] + .48 * x[2] > 1.26 ? 2 : 0)}; });
-  const std::vector<FuzzyNumber> inputs(3, make_triangular(0, .5, 1));
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    AlphaOptions options;
-    options.seed = seed;
-    const AlphaResult r = optimise(inputs, model, options, {});
+    const AlphaResult r = optimise_with(seed, model);
     const LevelBounds& l = r.outputs[0].levels[2];
     ASSERT_EQ(l.alpha, .5);
     EXPECT_NEAR(l.upper.value, 2 - .75 - (1.26 - .64 * .75 - .48 * .75) / .6, 1e-4) << seed;
