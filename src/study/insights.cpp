@@ -77,6 +77,7 @@ Budget calc_budget(const Problem& p, int limit) {
   // possibilities take what they need of that, but for a half
   b.possibilities = rest - b.knowing * axes / 2;
   b.bounds = rest - b.knowing * axes - rest / 10;
+  if (!p.limits.empty()) b.of_limit = std::min(rest / 20, rest / 8 / static_cast<int>(p.limits.size()));
   return b;
 }
 

@@ -20,6 +20,7 @@ struct Budget {
   int knowing = 0;        // per input, for what becomes of outcomes when it is known; 0: not looked for
   int bounds = 0;         // the search of bounds ends here, the points before it included
   int possibilities = 0;  // that of possibilities
+  int of_limit = 0;       // for how possible it is that a limit of the plan is broken: of each that some run breaks
   int outcomes = 0;       // that of outcomes with an input known; the rest is for boxes,
   int requirement = 0;    // but for so many to tell how possible it is that their requirement is broken
 };

@@ -13,6 +13,7 @@
 
 #include "base/error.h"
 #include "study/evaluator.h"
+#include "study/limits.h"
 #include "study/permissible.h"
 #include "study/requirement.h"
 
@@ -164,6 +165,10 @@ bool has_open_knowing(const Insights& in) {
   });
 }
 
+bool is_any_open(const std::vector<uncertainty::Possibility>& found) {
+  return std::any_of(found.begin(), found.end(), [](const auto& c) { return !c.converged; });
+}
+
 /// All bounds in a fixed order: of all runs, then of each class.
 template <class Alpha, class F>
 void for_each_level(Alpha& alpha, F work) {
@@ -272,8 +277,16 @@ class Manager {
     uncertainty::Asker asker([this](auto batch, auto out) { evaluate(batch, out); }, quiet, nullptr, budget.bounds);
     StudyResult r;
     ask_for_drivers(problem_, budget, asker);
+    const auto count_runs_of_limits = [&] {
+      return budget.of_limit * count_open_limits(problem_, r, asker.archive(), names_.outputs);
+    };
+    const auto find_broken_limits = [&] {
+      asker.set_limit(std::min(budget.possibilities, asker.asked() + count_runs_of_limits()));
+      if (asker.can_go_on()) find_limits(r, problem_, asker, names_.outputs);
+    };
     // possibilities before the bounds of each outcome, for which a quarter of the runs is kept
     options.before_classes = [&] {
+      find_broken_limits();
       asker.set_limit(budget.possibilities - (budget.possibilities - asker.asked()) / 4);
       find_possibilities(r, asker);
       asker.set_limit(std::max(budget.bounds, asker.asked() + (budget.possibilities - asker.asked()) / 2));
@@ -282,9 +295,12 @@ class Manager {
     r.alpha = search.run();
     const int asked_by_bounds = asker.asked();
     const auto has_classes = [&r] { return r.alpha.classes.size() > 1; };
+    if (!asker.is_cancelled() && !has_classes()) find_broken_limits();
     if (!asker.is_cancelled() && has_classes()) {
-      asker.set_limit(budget.possibilities);
+      asker.set_limit(budget.possibilities -
+                      std::min(count_runs_of_limits(), (budget.possibilities - asker.asked()) / 2));
       find_possibilities(r, asker);
+      find_broken_limits();
       if (!asker.is_cancelled() && budget.knowing > 0) {
         asker.set_limit(budget.outcomes);
         find_knowing(r, asker);
@@ -314,6 +330,7 @@ class Manager {
     // later runs may have found more
     r.possibilities.classes = uncertainty::read_possibilities(problem_.space, asker.archive(), r.possibilities.classes);
     read_requirement(r, problem_, asker.archive(), names_.outputs, names_.outcomes);
+    read_limits(r, problem_, asker.archive(), names_.outputs);
     r.ending = find_ending(r, asker);
     read_drivers(r.insights, problem_, budget, asker.archive());
     r.spread = find_spread_samples(problem_, budget, asker.archive());
@@ -374,8 +391,9 @@ class Manager {
   }
 
   /// What was kept for others and not used up goes to searches that had to end: first to possibilities of outcomes,
-  /// which take what they need, and of the requirement, which leave three quarters to bounds, then to outcomes with an
-  /// input known, the rest to bounds; and where those found a more possible run, to possibilities again.
+  /// which take what they need, and of the requirement and of limits, which leave three quarters to bounds, then to
+  /// outcomes with an input known, the rest to bounds; and where those found a more possible run, to possibilities
+  /// again.
   void give_back(StudyResult& r, uncertainty::Asker& asker, uncertainty::AlphaSearch& search) const {
     constexpr int most_passes = 3;
     const int limit = asker.limit();
@@ -384,6 +402,7 @@ class Manager {
       if (asker.can_go_on() && r.alpha.classes.size() > 1) find_possibilities(r, asker);
       if (r.alpha.can_go_on) asker.set_limit(asker.asked() + asker.rest() / 4);
       if (asker.can_go_on()) find_requirement(r, problem_, asker, names_.outputs, names_.outcomes);
+      if (asker.can_go_on()) find_limits(r, problem_, asker, names_.outputs);
       asker.set_limit(limit);
     };
     settle();
@@ -414,17 +433,15 @@ class Manager {
       // of a support without a width, as equations leave it, no place is met
       if (r.alpha.coverage.front().space_points == before) break;
       if (asker.can_go_on() && r.alpha.classes.size() > 1) find_possibilities(r, asker);
+      if (asker.can_go_on()) find_limits(r, problem_, asker, names_.outputs);
     }
   }
 
   static uncertainty::Ending find_ending(const StudyResult& r, const uncertainty::Asker& asker) {
     using uncertainty::Ending;
     if (asker.is_cancelled()) return Ending::Cancelled;
-    const bool is_open =
-        r.alpha.ending != Ending::Complete || has_open_knowing(r.insights) ||
-        std::any_of(r.possibilities.classes.begin(), r.possibilities.classes.end(),
-                    [](const auto& c) { return !c.converged; }) ||
-        std::any_of(r.requirement.begin(), r.requirement.end(), [](const auto& c) { return !c.converged; });
+    const bool is_open = r.alpha.ending != Ending::Complete || has_open_knowing(r.insights) ||
+                         is_any_open(r.possibilities.classes) || is_any_open(r.requirement) || is_any_open(r.limits);
     if (!is_open) return Ending::Complete;
     // a search of bounds keeps a few runs for its last steps
     const bool is_cut = asker.rest() == 0 || r.alpha.ending == Ending::LimitReached;
@@ -522,6 +539,7 @@ class Manager {
     marks["space_points"] = coverage;
     marks["classes"] = make_marks(r.possibilities.classes);
     marks["requirement"] = make_marks(r.requirement);
+    marks["limits"] = make_marks(r.limits);
     return marks;
   }
 
@@ -688,6 +706,8 @@ StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row
   take_marks("classes", r.possibilities.classes);
   read_requirement(r, problem, archive, names.outputs, names.outcomes);
   take_marks("requirement", r.requirement);
+  read_limits(r, problem, archive, names.outputs);
+  take_marks("limits", r.limits);
   const Budget budget = calc_budget(problem, make_alpha_options(problem).limit);
   if (summary.contains("insights")) read_json(r.insights, summary["insights"]);
   read_drivers(r.insights, problem, budget, archive);

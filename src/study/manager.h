@@ -44,6 +44,7 @@ struct StudyResult {
   uncertainty::AlphaResult alpha;     // with all samples
   uncertainty::PossibilityResult possibilities;
   std::vector<uncertainty::Possibility> requirement;  // of keeping and breaking Problem::permissible, see requirement.h
+  std::vector<uncertainty::Possibility> limits;       // of breaking Problem::limits[outcome], see limits.h
   uncertainty::Ending ending = uncertainty::Ending::Cancelled;
   Confirmation confirmation;  // of a condensed model
   std::vector<int> spread;    // samples that lie over the support irrespective of results

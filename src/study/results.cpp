@@ -14,6 +14,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "study/fans.h"
+#include "study/limits.h"
 #include "study/permissible.h"
 #include "study/randomness.h"
 #include "study/requirement.h"
@@ -250,6 +251,39 @@ json requirement_json(const Problem& p, const StudyResult& r) {
   return {{"text", p.permissible}, {"classes", classes}};
 }
 
+const char* name_of_kind(Limit::Kind kind) {
+  switch (kind) {
+    case Limit::Kind::Reach:
+      return "reach";
+    case Limit::Kind::Clearance:
+      return "clearance";
+    case Limit::Kind::Screening:
+      break;
+  }
+  return "screening";
+}
+
+json limits_json(const Problem& p, const StudyResult& r) {
+  json list = json::array();
+  for (const LimitFinding& f : list_limits(p, r)) {
+    const Limit& limit = p.limits[static_cast<std::size_t>(f.limit)];
+    const Quantity q = find_output(p, limit.output);
+    json& one = list.emplace_back(json{{"output", limit.output},
+                                       {"kind", name_of_kind(limit.kind)},
+                                       {"place", limit.place},
+                                       {"unit", q.unit},
+                                       {"limit", limit.least / q.unit_value},
+                                       {"source", limit.source},
+                                       {"runs", f.runs},
+                                       {"broken", f.broken},
+                                       {"open", f.open},
+                                       {"possibility", f.found.possibility},
+                                       {"sample", f.found.sample}});
+    add_search(one, f.found);
+  }
+  return list;
+}
+
 json quantities_json(const std::vector<Quantity>& list) {
   json out = json::array();
   for (const Quantity& q : list) out.push_back({{"name", q.name}, {"unit", q.unit}});
@@ -361,6 +395,7 @@ json make_results_json(const Problem& p, const StudyResult& r) {
   }
   out["not_met"] = list_unmet_outcomes(p, r);
   out["requirement"] = requirement_json(p, r);
+  out["limits"] = limits_json(p, r);
   out["coverage"] = json::array();
   for (const auto& c : r.alpha.coverage)
     out["coverage"].push_back({{"alpha", c.alpha}, {"samples", c.samples}, {"spread", c.space_points}});
@@ -408,6 +443,19 @@ std::string write_requirement_csv(const Problem& p, const StudyResult& r) {
                         cell(c.necessity), c.found.converged, c.is_necessity_converged);
   if (text.empty()) return text;
   return "requirement,class,runs,possibility,necessity,possibility_converged,necessity_converged\n" + text;
+}
+
+std::string write_limits_csv(const Problem& p, const StudyResult& r) {
+  std::string text;
+  for (const LimitFinding& f : list_limits(p, r)) {
+    const Limit& limit = p.limits[static_cast<std::size_t>(f.limit)];
+    const Quantity q = find_output(p, limit.output);
+    text += fmt::format("{},{},{},{},{},{},{},{},{},{:d}\n", cell(limit.output), name_of_kind(limit.kind),
+                        cell(limit.place), cell(q.unit), cell(limit.least / q.unit_value), f.runs, f.broken, f.open,
+                        cell(f.found.possibility), f.found.converged);
+  }
+  if (text.empty()) return text;
+  return "output,kind,place,unit,limit,runs,broken,open,possibility_of_breaking,possibility_converged\n" + text;
 }
 
 std::string write_samples_csv(const Problem& p, const StudyResult& r) {
@@ -580,6 +628,7 @@ std::vector<std::string> write_results(const std::string& folder, const Problem&
   write("membership.csv", write_membership_csv(p, r));
   write("outcomes.csv", write_outcomes_csv(r));
   write("requirement.csv", write_requirement_csv(p, r));
+  write("limits.csv", write_limits_csv(p, r));
   write("samples.csv", write_samples_csv(p, r));
   write("trajectories.csv", write_trajectories_csv(r));
   write("drivers.csv", write_drivers_csv(p, r));

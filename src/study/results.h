@@ -29,6 +29,8 @@ std::string write_membership_csv(const Problem&, const StudyResult&);
 std::string write_outcomes_csv(const StudyResult&);
 /// The same of runs that keep the requirement, break it and fail; empty if none is asked for.
 std::string write_requirement_csv(const Problem&, const StudyResult&);
+/// Limits of a plan: how runs fare with each, and how possible it is that it is broken; empty if there are none.
+std::string write_limits_csv(const Problem&, const StudyResult&);
 /// All runs: inputs, what follows from them, membership, outcome, outputs, why it failed.
 std::string write_samples_csv(const Problem&, const StudyResult&);
 /// Curves of runs, one row each: sample and ordinates; empty if the model gives none.

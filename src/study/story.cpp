@@ -10,6 +10,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "study/limits.h"
 #include "study/permissible.h"
 #include "study/randomness.h"
 #include "study/requirement.h"
@@ -22,8 +23,8 @@ namespace {
 using record::Status;
 using uncertainty::failed_outcome;
 
-/// What a study gives with a mark of convergence: bounds, possibilities, those of a requirement and those with an input
-/// known.
+/// What a study gives with a mark of convergence: bounds, possibilities, those of a requirement, of limits that are
+/// broken, and those with an input known.
 struct Marks {
   int open = 0, all = 0;
 };
@@ -43,6 +44,7 @@ Marks count_marks(const Problem& p, const StudyResult& r) {
   if (!is_of_outcomes(p))
     for (const auto& c : r.requirement)
       if (c.outcome != failed_outcome) add(c.converged);
+  for (const auto& c : r.limits) add(c.converged);
   for (const auto& k : r.insights.knowing)
     for (const auto& c : k.classes)
       if (c.possibility > 0) add(c.converged);
@@ -81,6 +83,11 @@ std::string tell_impossible(const std::string& what, long runs, std::size_t of_r
                                  what, runs, of_runs);
   if (!is_searched) text += " Its possibility was not searched to the end: it is at least 0.00.";
   return text;
+}
+
+std::string tell_end_of_search(bool is_converged) {
+  return is_converged ? " A search ended there, and found nothing more possible."
+                      : " No search has ended there, so it may be higher.";
 }
 
 void tell_outcomes(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
@@ -155,35 +162,54 @@ void doubt(const Problem& p, const StudyResult& r, Sentence& s) {
   s.status = Status::Warning;
 }
 
-/// Whether a value, which may still get worse by `left`, breaks a limit.
-bool is_broken(const Limit& limit, double value, double left = 0) {
-  switch (limit.kind) {
-    case Limit::Kind::Reach:
-      return value + left > limit.least;
-    case Limit::Kind::Clearance:
-      return value - left < limit.least;
-    case Limit::Kind::Screening:
-      break;
-  }
-  return value + left >= limit.least;
+/// How possible it is that a limit is broken, and by which values.
+std::string tell_breaking(const Problem& p, const StudyResult& r, const LimitFinding& f, bool is_screening) {
+  if (f.broken == 0) return is_screening ? "No run reaches the limit." : "No run breaks the limit.";
+  const double possibility = f.found.possibility;
+  if (!(possibility > 0))
+    return tell_impossible(is_screening ? "Reaching the limit" : "Breaking the limit", f.broken,
+                           static_cast<std::size_t>(f.runs), f.found.converged);
+  const std::string word = words_of_possibility(possibility), least = words_of_least(possibility);
+  std::string text =
+      is_screening ? fmt::format("It is {} that the band reaches the limit: possibility at least {}.", word, least)
+                   : fmt::format("It is {} that the limit is broken: possibility at least {}.", word, least);
+  if (f.is_core_broken) return text;
+  if (possibility < 1) text += tell_end_of_search(f.found.converged);
+  return text + fmt::format(" It takes no more than {}.", words_of_point(p, r.alpha.archive[f.found.sample].x));
 }
 
 /// What lies between which values, how many runs keep it, and how possible it is that it is broken.
-Sentence tell_debris_limit(const Limit& limit, const Quantity& q, const std::pair<double, double>& range, int runs,
-                           int breaking, int open, double possibility) {
+Sentence tell_debris_limit(const Problem& p, const StudyResult& r, const LimitFinding& f) {
   Sentence s;
+  const Limit& limit = p.limits[static_cast<std::size_t>(f.limit)];
+  const Quantity q = find_output(p, limit.output);
   const std::string what =
       limit.kind == Limit::Kind::Reach ? "Reach of the debris" : "Clearance of " + quoted(limit.place);
   s.text = fmt::format("{}: between {} and {}; {} of {} runs keep the limit of {} ({}). ", what,
-                       words_of_number(range.first / q.unit_value), words_of_value(q, range.second), runs - breaking,
-                       runs, words_of_value(q, limit.least), limit.source);
-  s.text += possibility > 0 ? fmt::format("It is {} that the limit is broken: possibility at least {}.",
-                                          words_of_possibility(possibility), words_of_least(possibility))
-            : breaking > 0  ? tell_impossible("Breaking the limit", breaking, static_cast<std::size_t>(runs), false)
-                            : std::string("No run breaks the limit.");
-  if (open > 0)
-    s.text += fmt::format(" In {} of the runs that keep it parts still moved when they ended, and may break it.", open);
-  s.status = possibility >= 0.5 ? Status::Bad : breaking > 0 || open > 0 ? Status::Warning : Status::Good;
+                       words_of_number(f.least / q.unit_value), words_of_value(q, f.most), f.runs - f.broken, f.runs,
+                       words_of_value(q, limit.least), limit.source);
+  s.text += tell_breaking(p, r, f, false);
+  if (f.open > 0)
+    s.text +=
+        fmt::format(" In {} of the runs that keep it parts still moved when they ended, and may break it.", f.open);
+  s.status = f.found.possibility >= 0.5 ? Status::Bad : f.broken > 0 || f.open > 0 ? Status::Warning : Status::Good;
+  return s;
+}
+
+Sentence tell_screening(const Problem& p, const StudyResult& r, const LimitFinding& f) {
+  Sentence s;
+  const Limit& limit = p.limits[static_cast<std::size_t>(f.limit)];
+  const Quantity q = find_output(p, limit.output);
+  s.text = fmt::format(
+      "Screening of ground vibration at {}: the upper end of the band lies between {} and {} over {} runs; limit {}{} "
+      "({}). ",
+      quoted(limit.place), words_of_number(f.least / q.unit_value), words_of_value(q, f.most), f.runs,
+      words_of_value(q, limit.least),
+      limit.most > limit.least ? fmt::format(" to {}, by frequency", words_of_value(q, limit.most)) : "", limit.source);
+  s.text += tell_breaking(p, r, f, true);
+  s.text += " This is a screening, no prediction.";
+  // as a run has it: a band that reaches the limit is a warning, one that lies above it is more
+  s.status = f.above >= 0.5 ? Status::Bad : f.broken > 0 ? Status::Warning : Status::Good;
   return s;
 }
 
@@ -200,70 +226,26 @@ struct LimitCounts {
   LimitCount debris, screenings;
 };
 
-/// How possible it is that an output breaks its limit: the most possible run that does.
 LimitCounts tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
   LimitCounts counts;
   const uncertainty::Sample* core = find_core(p, r.alpha.archive);
-  for (const Limit& limit : p.limits) {
-    const auto at = std::find(r.outputs.begin(), r.outputs.end(), limit.output);
-    if (at == r.outputs.end()) continue;
-    const auto index = static_cast<std::size_t>(at - r.outputs.begin());
-    const Quantity q = find_output(p, limit.output);
-    double possibility = 0, above = 0, low = std::numeric_limits<double>::infinity(), high = 0;
-    int runs = 0, reaching = 0, open = 0;
-    const auto left = std::find(r.outputs.begin(), r.outputs.end(), limit.left);
-    const auto left_index = static_cast<std::size_t>(left - r.outputs.begin());
-    for (int i = 0; i < static_cast<int>(r.alpha.archive.size()); ++i) {
-      const uncertainty::Sample& s = r.alpha.archive[i];
-      if (index >= s.result.values.size()) continue;
-      const double value = s.result.values[index], degree = uncertainty::calc_membership(p.space, s.x);
-      if (!(degree >= 0) || !std::isfinite(value)) continue;
-      ++runs;
-      low = std::min(low, value), high = std::max(high, value);
-      if (!is_broken(limit, value)) {
-        open += left_index < s.result.values.size() && is_broken(limit, value, s.result.values[left_index]);
-        continue;
-      }
-      ++reaching;
-      possibility = std::max(possibility, degree);
-      if (value > limit.above) above = std::max(above, degree);
-    }
-    if (runs == 0) continue;
-    LimitCount& count = limit.kind == Limit::Kind::Screening ? counts.screenings : counts.debris;
+  for (const LimitFinding& f : list_limits(p, r)) {
+    const Limit& limit = p.limits[static_cast<std::size_t>(f.limit)];
+    const bool is_screening = limit.kind == Limit::Kind::Screening;
+    LimitCount& count = is_screening ? counts.screenings : counts.debris;
     ++count.all;
-    if (core && index < core->result.values.size() && is_broken(limit, core->result.values[index])) {
+    if (f.is_core_broken) {
+      const auto index = std::find(r.outputs.begin(), r.outputs.end(), limit.output) - r.outputs.begin();
       ++count.at_core;
-      count.is_above |= core->result.values[index] > limit.above;
-    } else if (possibility > 0) {
+      count.is_above |= core->result.values[static_cast<std::size_t>(index)] > limit.above;
+    } else if (f.found.possibility > 0) {
       ++count.elsewhere;
-      count.possibility = std::max(count.possibility, possibility);
+      count.possibility = std::max(count.possibility, f.found.possibility);
     } else {
-      count.open += open > 0;
+      count.open += f.open > 0;
     }
-    Sentence s;
-    if (limit.kind != Limit::Kind::Screening) {
-      s = tell_debris_limit(limit, q, {low, high}, runs, reaching, open, possibility);
-      s.id = "limit." + limit.output;
-      doubt(p, r, s);
-      out.push_back(std::move(s));
-      continue;
-    }
+    Sentence s = is_screening ? tell_screening(p, r, f) : tell_debris_limit(p, r, f);
     s.id = "limit." + limit.output;
-    s.text = fmt::format(
-        "Screening of ground vibration at {}: the upper end of the band lies between {} and {} over {} runs; limit "
-        "{}{} "
-        "({}). ",
-        quoted(limit.place), words_of_number(low / q.unit_value), words_of_value(q, high), runs,
-        words_of_value(q, limit.least),
-        limit.most > limit.least ? fmt::format(" to {}, by frequency", words_of_value(q, limit.most)) : "",
-        limit.source);
-    s.text += possibility > 0 ? fmt::format("It is {} that the band reaches the limit: possibility at least {}.",
-                                            words_of_possibility(possibility), words_of_least(possibility))
-              : reaching > 0  ? tell_impossible("Reaching the limit", reaching, static_cast<std::size_t>(runs), false)
-                              : std::string("No run reaches the limit.");
-    s.text += " This is a screening, no prediction.";
-    // as a run has it: a band that reaches the limit is a warning, one that lies above it is more
-    s.status = above >= 0.5 ? Status::Bad : reaching > 0 ? Status::Warning : Status::Good;
     doubt(p, r, s);
     out.push_back(std::move(s));
   }
@@ -346,9 +328,7 @@ void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Senten
                   ? fmt::format("{} is {}: possibility at least {}, so the necessity of keeping it is at most {}.",
                                 what, word, least, words_of_most(1 - found.possibility))
                   : fmt::format("Keeping it is {}: possibility at least {}.", word, least);
-    if (found.possibility < 1)
-      s.text += is_searched ? " A search ended there, and found nothing more possible."
-                            : " No search has ended there, so it may be higher.";
+    if (found.possibility < 1) s.text += tell_end_of_search(is_searched);
     if (found.outcome == failed_outcome) s.text += " The run with this possibility failed.";
     s.text += fmt::format(" It takes no more than {}.", words_of_point(p, r.alpha.archive[found.sample].x));
   } else if (runs > 0) {
@@ -622,6 +602,11 @@ std::vector<NotableRun> list_notable_runs(const Problem& p, const StudyResult& r
                                                           ? "most possible run that keeps the requirement ({})"
                                                           : "most possible run that breaks the requirement ({})"),
                                          words_of_least(c.found.possibility))});
+  for (const LimitFinding& f : list_limits(p, r))
+    if (f.found.sample >= 0 && f.found.possibility < 1)
+      runs.push_back({f.found.sample, fmt::format("most possible run that breaks the limit of {} ({})",
+                                                  p.limits[static_cast<std::size_t>(f.limit)].output,
+                                                  words_of_least(f.found.possibility))});
   for (const auto& c : r.possibilities.classes)
     if (c.sample >= 0 && (!core || uncertainty::outcome_of(core->result) != c.outcome))
       runs.push_back({c.sample, fmt::format("most possible run with the outcome {} ({})",

@@ -33,28 +33,6 @@ StudyResult run(const Problem& p, const Folder& folder, const char* name, const 
   return run_study(p, factories, o, {}, {});
 }
 
-RunnerFactories make_factories(const std::function<Answer(const Point&)>& model) {
-  return {{"small", [model](const std::string&) -> Runner {
-             return [model](auto points, const auto& give, const auto&) {
-               for (std::size_t i = 0; i < points.size(); ++i) give(i, model(points[i]));
-             };
-           }}};
-}
-
-Answer done(std::vector<std::pair<std::string, double>> outputs, const std::string& outcome,
-            std::vector<double> trajectory = {}) {
-  return {Answer::Kind::Done, std::move(outputs), outcome, std::move(trajectory), "", 0};
-}
-
-Problem make_problem(std::vector<uncertainty::FuzzyNumber> inputs, int limit) {
-  Problem p;
-  p.kind = "small";
-  for (std::size_t i = 0; i < inputs.size(); ++i) p.inputs.push_back({"x" + std::to_string(i + 1), "", 1});
-  p.space.inputs = std::move(inputs);
-  p.limit = limit;
-  return p;
-}
-
 /// The reference case "jump" without its failing corner.
 Answer calc_jump(const Point& x) {
   const double R = x[0] * x[1] / 100;
@@ -68,7 +46,11 @@ TEST(Budget, SharesRunsOutAndNeverPassesTheLimit) {
         Problem p = make_small_problem(limit);
         p.permissible = has_boxes ? "stands" : "";
         p.has_drivers = has_drivers;
+        EXPECT_EQ(calc_budget(p, limit).of_limit, 0);
+        p.limits.resize(3);
         const Budget b = calc_budget(p, limit);
+        EXPECT_LE(3 * b.of_limit, b.outcomes / 8) << limit;
+        EXPECT_EQ(b.of_limit > 0, limit >= 100) << limit;
         EXPECT_LE(4 * b.rows + b.spread, b.bounds) << limit;
         EXPECT_LE(b.bounds, b.possibilities);
         EXPECT_EQ(b.possibilities + b.knowing, b.outcomes);

@@ -57,14 +57,6 @@ RunnerFactories make_all(const RunnerFactories& models) {
   return {{random_kind, [models](const std::string& definition) { return make_random_runner(definition, models); }}};
 }
 
-Answer done(std::vector<std::pair<std::string, double>> outputs, std::string outcome = {}) {
-  Answer a;
-  a.kind = Answer::Kind::Done;
-  a.outputs = std::move(outputs);
-  a.outcome = std::move(outcome);
-  return a;
-}
-
 Problem read(const std::string& text) {
   Problem p = read_inputs_text(text, "in.toml");
   set_evaluator(p, "model", 0, false);

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -22,25 +21,9 @@ namespace {
 using json = nlohmann::json;
 using uncertainty::make_triangular;
 
-Answer done(std::vector<std::pair<std::string, double>> outputs, const std::string& outcome = "") {
-  return {Answer::Kind::Done, std::move(outputs), outcome, {}, "", 0};
-}
-
-RunnerFactories make_factories(const std::function<Answer(const Point&)>& model) {
-  return {{"small", [model](const std::string&) -> Runner {
-             return [model](auto points, const auto& give, const auto&) {
-               for (std::size_t i = 0; i < points.size(); ++i) give(i, model(points[i]));
-             };
-           }}};
-}
-
-Problem make_problem(int inputs, const std::string& permissible, int limit) {
-  Problem p;
-  p.kind = "small";
-  for (int i = 0; i < inputs; ++i) p.inputs.push_back({"x" + std::to_string(i + 1), "", 1});
-  p.space.inputs.assign(static_cast<std::size_t>(inputs), make_triangular(-1, 0, 1));
+Problem make_asked(int inputs, const std::string& permissible, int limit) {
+  Problem p = make_problem(std::vector(static_cast<std::size_t>(inputs), make_triangular(-1, 0, 1)), limit);
   p.permissible = permissible;
-  p.limit = limit;
   return p;
 }
 
@@ -110,7 +93,7 @@ TEST(RequirementPhysics, PossibilitiesHaveClosedForms) {
   const Folder folder;
   std::uint64_t seed = 0;
   for (const Case& c : make_cases()) {
-    Problem p = make_problem(c.inputs, c.permissible, 10000);
+    Problem p = make_asked(c.inputs, c.permissible, 10000);
     p.seed = ++seed;
     const StudyResult r = run(p, folder, c.name, c.model);
     std::map<std::string, RequirementClass> by_name = list(p, r);
@@ -153,7 +136,7 @@ TEST(Requirement, OfOutcomesAloneIsToldByTheirPossibilities) {
 
 TEST(Requirement, IsNotProvenWhereNoRunBreaksIt) {
   const Folder folder;
-  const Problem p = make_problem(2, "z <= 7", 600);
+  const Problem p = make_asked(2, "z <= 7", 600);
   const StudyResult r = run(p, folder, "s", [](const Point& x) { return done({{"z", x[0]}}); });
   std::map<std::string, RequirementClass> by_name = list(p, r);
   EXPECT_EQ(by_name["broken"].runs, 0);
@@ -172,7 +155,7 @@ TEST(Requirement, IsNotProvenWhereNoRunBreaksIt) {
 
 TEST(Requirement, SaysWhatWouldKeepItWhereTheCoreBreaksIt) {
   const Folder folder;
-  Problem p = make_problem(2, "z >= 0.5", 2000);
+  Problem p = make_asked(2, "z >= 0.5", 2000);
   const auto model = [](const Point& x) { return done({{"z", x[0]}}); };
   const Sentence told = tell_it(p, run(p, folder, "a", model));
   EXPECT_EQ(told.status, record::Status::Bad);
@@ -188,7 +171,7 @@ TEST(Requirement, SaysWhatWouldKeepItWhereTheCoreBreaksIt) {
 // x1 > 0.5 fails, x1 < -0.8 breaks the requirement: the failures are the more possible ones.
 TEST(Requirement, IsNotKeptByFailedRuns) {
   const Folder folder;
-  const Problem p = make_problem(2, "z >= -0.8", 3000);
+  const Problem p = make_asked(2, "z >= -0.8", 3000);
   const StudyResult r = run(p, folder, "s", [](const Point& x) {
     return x[0] > 0.5 ? Answer{Answer::Kind::Failed, {}, "", {}, "broke down", 0} : done({{"z", x[0]}});
   });
@@ -204,7 +187,7 @@ TEST(Requirement, IsNotKeptByFailedRuns) {
 
 // "arch" takes a ring that no run meets before the search of boxes.
 TEST(Requirement, KnowsOutcomesThatRunsMeetLater) {
-  Problem p = make_problem(1, "arch, z <= 1", 100);
+  Problem p = make_asked(1, "arch, z <= 1", 100);
   const std::vector<std::string> outputs = {"z"};
   std::vector<std::string> outcomes = {"falls"};
   const uncertainty::Classify classify = make_requirement_classes(p, outputs, outcomes);
@@ -227,22 +210,7 @@ TEST(RequirementReplay, IsTheSameForAnyThreadsAfterInterruptionsAndInTheStore) {
   p.permissible = "stands, root <= 5";
   const StudyResult whole = run(p, folder, "a", calc_small, 1);
   EXPECT_EQ(write_bits(run(p, folder, "b", calc_small, 4)), write_bits(whole));
-  StudyOptions o;
-  o.store = folder / "c";
-  o.pool.batch = 8;
-  StudyResult part;
-  for (const long stop : {400L, 300L, 200L, 100000L}) {
-    std::atomic<bool> cancel = false;
-    std::atomic<long> runs = 0;
-    Progress progress;
-    progress.cancel = &cancel;
-    part = run_study(p, make_factories([&](const Point& x) {
-                       if (++runs >= stop) cancel = true;
-                       return calc_small(x);
-                     }),
-                     o, progress, {});
-    EXPECT_EQ(part.is_finished, stop == 100000L) << stop;
-  }
+  const StudyResult part = run_in_parts(p, folder / "c", calc_small);
   EXPECT_EQ(write_results_json(p, part), write_results_json(p, whole));
   Store store(folder / "a");
   const StudyResult again = read_study(p, store, *store.find_study("main"));

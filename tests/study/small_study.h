@@ -1,11 +1,17 @@
 #pragma once
 /// A study with a jump and a failure, small enough for tests, and what two of them must have in common.
 
+#include <gtest/gtest.h>
+
+#include <atomic>
 #include <bit>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "study/manager.h"
 
@@ -48,6 +54,51 @@ inline RunnerFactories make_small_factories(double seconds = 0) {
            }}};
 }
 
+inline Answer done(std::vector<std::pair<std::string, double>> outputs, const std::string& outcome = "",
+                   std::vector<double> trajectory = {}) {
+  return {Answer::Kind::Done, std::move(outputs), outcome, std::move(trajectory), "", 0};
+}
+
+/// Of any model; its problems are of the kind "small".
+inline RunnerFactories make_factories(const std::function<Answer(const Point&)>& model) {
+  return {{"small", [model](const std::string&) -> Runner {
+             return [model](auto points, const auto& give, const auto&) {
+               for (std::size_t i = 0; i < points.size(); ++i) give(i, model(points[i]));
+             };
+           }}};
+}
+
+/// In four parts: interrupted after so many runs, and gone on with.
+inline StudyResult run_in_parts(const Problem& p, const std::string& store,
+                                const std::function<Answer(const Point&)>& model) {
+  StudyOptions o;
+  o.store = store;
+  o.pool.batch = 8;
+  StudyResult part;
+  for (const long stop : {400L, 300L, 200L, 100000L}) {
+    std::atomic<bool> cancel = false;
+    std::atomic<long> runs = 0;
+    Progress progress;
+    progress.cancel = &cancel;
+    part = run_study(p, make_factories([&](const Point& x) {
+                       if (++runs >= stop) cancel = true;
+                       return model(x);
+                     }),
+                     o, progress, {});
+    EXPECT_EQ(part.is_finished, stop == 100000L) << stop;
+  }
+  return part;
+}
+
+inline Problem make_problem(std::vector<uncertainty::FuzzyNumber> inputs, int limit) {
+  Problem p;
+  p.kind = "small";
+  for (std::size_t i = 0; i < inputs.size(); ++i) p.inputs.push_back({"x" + std::to_string(i + 1), "", 1});
+  p.space.inputs = std::move(inputs);
+  p.limit = limit;
+  return p;
+}
+
 /// Every bit that a study found.
 inline std::string write_bits(const StudyResult& r) {
   std::string text;
@@ -65,7 +116,8 @@ inline std::string write_bits(const StudyResult& r) {
     add(c.possibility), add_bounds(c.outputs);
   }
   for (const auto& p : r.possibilities.classes) add(p.possibility);
-  for (const auto& p : r.requirement) add(p.possibility), add(p.resolution), text += p.converged ? "c" : "o";
+  for (const auto* found : {&r.requirement, &r.limits})
+    for (const auto& p : *found) add(p.possibility), add(p.resolution), text += p.converged ? "c" : "o";
   for (const auto& s : r.alpha.archive.samples()) {
     for (const double x : s.x) add(x);
     for (const double y : s.result.values) add(y);

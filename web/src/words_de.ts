@@ -994,6 +994,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["None of {:d} runs kept it.", "Keine von {} Rechnungen hielt sie ein."],
   ["most possible run that keeps the requirement ({:.2f})", "möglichste Rechnung, die die Forderung einhält ({})"],
   ["most possible run that breaks the requirement ({:.2f})", "möglichste Rechnung, die die Forderung nicht einhält ({})"],
+  ["most possible run that breaks the limit of {} ({:.2f})", "möglichste Rechnung, die die Vorgabe für {} nicht einhält ({})"],
   ["Requirement", "Forderung"],
   ["requirement kept", "Forderung eingehalten"],
   ["requirement broken", "Forderung nicht eingehalten"],
