@@ -9,7 +9,6 @@
 #include "server.h"
 #include "small_study.h"
 #include "study/insights.h"
-#include "study/page.h"
 #include "study/results.h"
 #include "study/story.h"
 
@@ -35,15 +34,6 @@ Problem make_limited(int inputs, std::vector<Limit> limits, int runs) {
   return p;
 }
 
-StudyResult run(const Problem& p, const Folder& folder, const char* name,
-                const std::function<Answer(const Point&)>& model, int jobs = 2) {
-  StudyOptions o;
-  o.store = folder / name;
-  o.pool.jobs = jobs;
-  o.pool.batch = 16;
-  return run_study(p, make_factories(model), o, {}, {});
-}
-
 Answer calc_three(const Point& x) {
   return done({{"reach", x[0] - 0.5 * x[1] + 0.3 * x[2]},
                {"clearance", std::hypot((x[0] - .7) / .3, (x[1] + .1) / .2, x[2] / .25)},
@@ -64,7 +54,7 @@ TEST(LimitsPhysics, PossibilitiesHaveClosedForms) {
   for (const int seed : {1, 2, 3}) {
     Problem p = make_limited(3, make_three(), 10000);
     p.seed = static_cast<std::uint64_t>(seed);
-    const StudyResult r = run(p, folder, std::to_string(seed).c_str(), calc_three);
+    const StudyResult r = run_model(p, folder / std::to_string(seed), calc_three);
     const std::vector<LimitFinding> all = list_limits(p, r);
     ASSERT_EQ(all.size(), 3u);
     for (int k = 0; k < 3; ++k) {
@@ -102,10 +92,10 @@ TEST(LimitsPhysics, ShortStudiesComeNearer) {
         sum += 0.289 - all[0].found.possibility + 0.6 - all[1].found.possibility + 0.25 - all[2].found.possibility;
       };
       const std::string name = std::to_string(seed) + (has_boxes ? "b" : "");
-      add_error(searched, run(p, folder, name.c_str(), calc_three));
+      add_error(searched, run_model(p, folder / name, calc_three));
       Problem without = p;
       without.limits.clear();
-      add_error(met, run(without, folder, ("w" + name).c_str(), calc_three));
+      add_error(met, run_model(without, folder / ("w" + name), calc_three));
     }
     EXPECT_LT(searched, 0.5 * met) << has_boxes << " " << searched / 15 << " " << met / 15;
   }
@@ -120,7 +110,7 @@ TEST(Limits, AreNotSearchedForWhereTheCoreOrNoRunBreaksThem) {
       600);
   Problem without = p;
   without.limits.clear();
-  const StudyResult r = run(p, folder, "a", model), plain = run(without, folder, "b", model);
+  const StudyResult r = run_model(p, folder / "a", model), plain = run_model(without, folder / "b", model);
   EXPECT_EQ(r.alpha.archive.size(), plain.alpha.archive.size());
   const std::vector<LimitFinding> all = list_limits(p, r);
   ASSERT_EQ(all.size(), 2u) << "no run has the third output";
@@ -144,7 +134,7 @@ TEST(Limits, TellWhetherTheirSearchHasEndedAndWhatItTakes) {
       if (s.id == "limit.reach") return s.text;
     return std::string();
   };
-  StudyResult r = run(p, folder, "a", model);
+  StudyResult r = run_model(p, folder / "a", model);
   const char* ended =
       "It is hardly possible that the limit is broken: possibility at least 0.24. A search ended there, and "
       "found nothing more possible. It takes no more than x1 0.75";
@@ -160,16 +150,7 @@ TEST(LimitsReplay, AreTheSameForAnyThreadsAfterInterruptionsAndInTheStore) {
   const Folder folder;
   Problem p = make_small_problem(1500);
   p.limits = {make_limit("root", 4.5, Kind::Reach), make_limit("z", -9, Kind::Clearance)};
-  const StudyResult whole = run(p, folder, "a", calc_small, 1);
-  ASSERT_EQ(whole.limits.size(), 2u);
-  EXPECT_EQ(write_bits(run(p, folder, "b", calc_small, 4)), write_bits(whole));
-  const StudyResult part = run_in_parts(p, folder / "c", calc_small);
-  EXPECT_EQ(write_results_json(p, part), write_results_json(p, whole));
-  Store store(folder / "a");
-  const StudyResult again = read_study(p, store, *store.find_study("main"));
-  EXPECT_EQ(write_results_json(p, again), write_results_json(p, whole));
-  EXPECT_EQ(write_limits_csv(p, again), write_limits_csv(p, whole));
-  EXPECT_EQ(to_page_json(p, again, {}), to_page_json(p, whole, {}));
+  EXPECT_EQ(expect_replays(p, folder / "").limits.size(), 2u);
 }
 
 }  // namespace

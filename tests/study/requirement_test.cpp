@@ -11,7 +11,6 @@
 #include "base/error.h"
 #include "server.h"
 #include "small_study.h"
-#include "study/page.h"
 #include "study/results.h"
 #include "study/story.h"
 
@@ -25,15 +24,6 @@ Problem make_asked(int inputs, const std::string& permissible, int limit) {
   Problem p = make_problem(std::vector(static_cast<std::size_t>(inputs), make_triangular(-1, 0, 1)), limit);
   p.permissible = permissible;
   return p;
-}
-
-StudyResult run(const Problem& p, const Folder& folder, const std::string& name,
-                const std::function<Answer(const Point&)>& model, int jobs = 2) {
-  StudyOptions o;
-  o.store = folder / name.c_str();
-  o.pool.jobs = jobs;
-  o.pool.batch = 16;
-  return run_study(p, make_factories(model), o, {}, {});
 }
 
 std::map<std::string, RequirementClass> list(const Problem& p, const StudyResult& r) {
@@ -95,7 +85,7 @@ TEST(RequirementPhysics, PossibilitiesHaveClosedForms) {
   for (const Case& c : make_cases()) {
     Problem p = make_asked(c.inputs, c.permissible, 10000);
     p.seed = ++seed;
-    const StudyResult r = run(p, folder, c.name, c.model);
+    const StudyResult r = run_model(p, folder / c.name, c.model);
     std::map<std::string, RequirementClass> by_name = list(p, r);
     EXPECT_NEAR(by_name["broken"].found.possibility, c.broken, c.within) << c.name;
     EXPECT_NEAR(by_name["kept"].found.possibility, c.kept, c.within) << c.name;
@@ -118,7 +108,7 @@ TEST(Requirement, OfOutcomesAloneIsToldByTheirPossibilities) {
   const Folder folder;
   Problem p = make_small_problem(2000);
   p.permissible = "stands";
-  const StudyResult r = run(p, folder, "s", calc_small);
+  const StudyResult r = run_model(p, folder / "s", calc_small);
   std::map<std::string, RequirementClass> by_name = list(p, r);
   ASSERT_EQ(by_name.size(), 3u);
   for (const uncertainty::Possibility& c : r.possibilities.classes) {
@@ -137,7 +127,7 @@ TEST(Requirement, OfOutcomesAloneIsToldByTheirPossibilities) {
 TEST(Requirement, IsNotProvenWhereNoRunBreaksIt) {
   const Folder folder;
   const Problem p = make_asked(2, "z <= 7", 600);
-  const StudyResult r = run(p, folder, "s", [](const Point& x) { return done({{"z", x[0]}}); });
+  const StudyResult r = run_model(p, folder / "s", [](const Point& x) { return done({{"z", x[0]}}); });
   std::map<std::string, RequirementClass> by_name = list(p, r);
   EXPECT_EQ(by_name["broken"].runs, 0);
   EXPECT_EQ(by_name["broken"].found.possibility, 0);
@@ -157,13 +147,13 @@ TEST(Requirement, SaysWhatWouldKeepItWhereTheCoreBreaksIt) {
   const Folder folder;
   Problem p = make_asked(2, "z >= 0.5", 2000);
   const auto model = [](const Point& x) { return done({{"z", x[0]}}); };
-  const Sentence told = tell_it(p, run(p, folder, "a", model));
+  const Sentence told = tell_it(p, run_model(p, folder / "a", model));
   EXPECT_EQ(told.status, record::Status::Bad);
   EXPECT_NE(told.text.find("break the requirement z >= 0.5. Keeping it is well possible: possibility at least 0.5"),
             std::string::npos)
       << told.text;
   p.permissible = "z > 3";
-  const StudyResult never = run(p, folder, "b", model);
+  const StudyResult never = run_model(p, folder / "b", model);
   EXPECT_EQ(tell_it(p, never).text, fmt::format("The core values break the requirement z > 3. None of {} runs kept it.",
                                                 never.alpha.archive.size()));
 }
@@ -172,7 +162,7 @@ TEST(Requirement, SaysWhatWouldKeepItWhereTheCoreBreaksIt) {
 TEST(Requirement, IsNotKeptByFailedRuns) {
   const Folder folder;
   const Problem p = make_asked(2, "z >= -0.8", 3000);
-  const StudyResult r = run(p, folder, "s", [](const Point& x) {
+  const StudyResult r = run_model(p, folder / "s", [](const Point& x) {
     return x[0] > 0.5 ? Answer{Answer::Kind::Failed, {}, "", {}, "broke down", 0} : done({{"z", x[0]}});
   });
   std::map<std::string, RequirementClass> by_name = list(p, r);
@@ -208,15 +198,7 @@ TEST(RequirementReplay, IsTheSameForAnyThreadsAfterInterruptionsAndInTheStore) {
   const Folder folder;
   Problem p = make_small_problem(1500);
   p.permissible = "stands, root <= 5";
-  const StudyResult whole = run(p, folder, "a", calc_small, 1);
-  EXPECT_EQ(write_bits(run(p, folder, "b", calc_small, 4)), write_bits(whole));
-  const StudyResult part = run_in_parts(p, folder / "c", calc_small);
-  EXPECT_EQ(write_results_json(p, part), write_results_json(p, whole));
-  Store store(folder / "a");
-  const StudyResult again = read_study(p, store, *store.find_study("main"));
-  EXPECT_EQ(write_results_json(p, again), write_results_json(p, whole));
-  EXPECT_EQ(write_requirement_csv(p, again), write_requirement_csv(p, whole));
-  EXPECT_EQ(to_page_json(p, again, {}), to_page_json(p, whole, {}));
+  expect_replays(p, folder / "");
 }
 
 }  // namespace

@@ -14,6 +14,8 @@
 #include <vector>
 
 #include "study/manager.h"
+#include "study/page.h"
+#include "study/results.h"
 
 namespace topple::study {
 
@@ -66,6 +68,15 @@ inline RunnerFactories make_factories(const std::function<Answer(const Point&)>&
                for (std::size_t i = 0; i < points.size(); ++i) give(i, model(points[i]));
              };
            }}};
+}
+
+inline StudyResult run_model(const Problem& p, const std::string& store,
+                             const std::function<Answer(const Point&)>& model, int jobs = 2) {
+  StudyOptions o;
+  o.store = store;
+  o.pool.jobs = jobs;
+  o.pool.batch = 16;
+  return run_study(p, make_factories(model), o, {}, {});
 }
 
 /// In four parts: interrupted after so many runs, and gone on with.
@@ -124,6 +135,22 @@ inline std::string write_bits(const StudyResult& r) {
     text += s.result.text + "\n";
   }
   return text;
+}
+
+/// The same bits and texts for any threads, after interruptions and out of the store.
+///   folder  of the stores, with a slash at its end
+inline StudyResult expect_replays(const Problem& p, const std::string& folder) {
+  StudyResult whole = run_model(p, folder + "a", calc_small, 1);
+  EXPECT_EQ(write_bits(run_model(p, folder + "b", calc_small, 4)), write_bits(whole));
+  Store store(folder + "a");
+  for (const StudyResult& r :
+       {run_in_parts(p, folder + "c", calc_small), read_study(p, store, *store.find_study("main"))}) {
+    EXPECT_EQ(write_results_json(p, r), write_results_json(p, whole));
+    EXPECT_EQ(write_requirement_csv(p, r), write_requirement_csv(p, whole));
+    EXPECT_EQ(write_limits_csv(p, r), write_limits_csv(p, whole));
+    EXPECT_EQ(to_page_json(p, r, {}), to_page_json(p, whole, {}));
+  }
+  return whole;
 }
 
 }  // namespace topple::study
