@@ -20,6 +20,14 @@ has() { grep -qF -- "$2" "$1" || { echo "$1 does not hold: $2"; head -20 "$1"; f
 lacks() { ! grep -qF -- "$2" "$1" || { echo "$1 holds: $2"; failures=$((failures + 1)); }; }
 exists() { [ -s "$1" ] || { echo "no file $1"; failures=$((failures + 1)); }; }
 is_json() { python3 -c 'import json,sys; json.load(open(sys.argv[1]))' "$1" || { echo "$1 is not JSON"; failures=$((failures + 1)); }; }
+# start FILE TEXT COMMAND...: in the background as $pid, until its out or err holds the text, not that of one before
+start() {
+  local file=$1 text=$2; shift 2
+  rm -f out err
+  "$@" >out 2>err &
+  pid=$!
+  for _ in $(seq 3000); do grep -q "$text" "$file" 2>/dev/null && break; sleep 0.02; done
+}
 
 case $case_name in
 usage)
@@ -230,8 +238,7 @@ fe)
   expect 2 "$topple" run "$plan" -o taken --json; is_json out; has out '"code": "E801"'; has taken kept
   expect 2 "$topple" fe missing.toml -o none; [ ! -e none ] || { echo "a folder for nothing"; failures=$((failures + 1)); }
   # an interrupt leaves a record and a checkpoint from which it goes on
-  "$topple" fe "$plan" --size "20 cm" --checkpoint -o cut >out 2>err &
-  pid=$!; for _ in $(seq 600); do grep -q "stage 1" out && break; sleep 0.1; done
+  start out "stage 1" "$topple" fe "$plan" --size "20 cm" --checkpoint -o cut
   kill -INT $pid; wait $pid; code=$?
   [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; cat out err; failures=$((failures + 1)); }
   has out "Cancelled at"; has out "--resume"; exists cut/checkpoint.bin; exists cut/record.h5
@@ -242,8 +249,7 @@ fe)
   expect 0 "$topple" fe "$plan" --size "20 cm" --until "500 ms" --csv --no-report -o whole
   cmp cut/bodies.csv whole/bodies.csv && cmp cut/series.csv whole/series.csv || failures=$((failures + 1))
   # there is nothing to go on from while the dead load is put on
-  "$topple" fe "$plan" --size "10 cm" --checkpoint -o early >out 2>err &
-  pid=$!; for _ in $(seq 600); do grep -q "Putting on" out && break; sleep 0.1; done
+  start out "Putting on" "$topple" fe "$plan" --size "10 cm" --checkpoint -o early
   kill -INT $pid; wait $pid; code=$?
   [ $code -eq 1 ] || { echo "exit code $code after an early interrupt"; cat out err; failures=$((failures + 1)); }
   lacks out "--resume"; [ ! -e early/checkpoint.bin ] || { echo "a checkpoint of nothing"; failures=$((failures + 1)); }
@@ -521,17 +527,13 @@ report)
   expect 2 "$topple" report missing.h5 -o r2.html --json; is_json out; has out '"code": "E701"'
   ;;
 cancel)
-  "$topple" run "$source/examples/weida/plan.toml" -o a --no-report --duration 500s >out 2>err &
-  pid=$!
-  for _ in $(seq 100); do grep -q "fired" out && break; sleep 0.1; done
+  start out "fired" "$topple" run "$source/examples/weida/plan.toml" -o a --no-report --duration 500s
   kill -INT $pid
   wait $pid; code=$?
   [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; head out err; failures=$((failures + 1)); }
   exists a/record.h5; has out "Cancelled at"
   # both times of the object are those of the end, not of the last frame
-  "$topple" run "$source/examples/weida/plan.toml" -o j --no-report --duration 500s --json >out 2>err &
-  pid=$!
-  for _ in $(seq 100); do grep -q "fired" err && break; sleep 0.1; done
+  start err "fired" "$topple" run "$source/examples/weida/plan.toml" -o j --no-report --duration 500s --json
   kill -INT $pid; wait $pid
   python3 -c 'import json; o = json.load(open("out")); assert o["ending_text"] == "Cancelled at %.2f s." % o["simulated_time"], o' || failures=$((failures + 1))
   # exports and what else takes its time end, and leave nothing behind that is not whole
@@ -703,15 +705,13 @@ PY
   expect 1 env TMPDIR="$work/nowhere" "$topple" doctor --json; is_json out; has out '"exit_code": 1'
   # what was not done is not said to have failed
   for signal in INT TERM HUP; do
-    "$topple" doctor >out 2>err &
-    pid=$!; for _ in $(seq 100); do grep -q "Self-check" out && break; sleep 0.02; done
+    start out "Self-check" "$topple" doctor
     kill -$signal $pid; wait $pid; code=$?
     [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; cat out err; failures=$((failures + 1)); }
     has out "Cancelled: "; has out "nothing is said of the others"; lacks out "FAILED"; lacks out "do not trust"
   done
   # under nohup it goes on when the terminal is gone
-  nohup "$topple" doctor >out 2>err </dev/null &
-  pid=$!; for _ in $(seq 100); do grep -q "Self-check" out && break; sleep 0.02; done
+  start out "Self-check" nohup "$topple" doctor
   kill -HUP $pid; wait $pid; code=$?
   [ $code -eq 0 ] || { echo "exit code $code under nohup"; cat out err; failures=$((failures + 1)); }
   ;;
