@@ -290,6 +290,7 @@ class Manager {
       asker.set_limit(budget.possibilities - (budget.possibilities - asker.asked()) / 4);
       find_possibilities(r, asker);
       asker.set_limit(std::max(budget.bounds, asker.asked() + (budget.possibilities - asker.asked()) / 2));
+      return r.possibilities.facets;
     };
     uncertainty::AlphaSearch search(problem_.space, asker, options);
     r.alpha = search.run();
@@ -376,6 +377,7 @@ class Manager {
     uncertainty::PossibilityOptions o;
     o.seed = problem_.seed;
     o.known = r.possibilities.classes;
+    o.facets = r.possibilities.facets;
     r.possibilities = uncertainty::find_possibilities(problem_.space, asker, o);
   }
 
@@ -387,7 +389,8 @@ class Manager {
     o.seed = problem_.seed + 1000 * static_cast<std::uint64_t>(pass);
     if (pass > 0) o.spread = 100;
     const int each = asker.rest() / std::max(1, static_cast<int>(axes));
-    r.insights.knowing = uncertainty::find_outcomes_of_knowing(problem_.space, asker, o, each, r.insights.knowing);
+    r.insights.knowing = uncertainty::find_outcomes_of_knowing(problem_.space, asker, o, each, r.insights.knowing,
+                                                               r.possibilities.facets);
   }
 
   /// What was kept for others and not used up goes to searches that had to end: first to possibilities of outcomes,

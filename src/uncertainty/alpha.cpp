@@ -10,6 +10,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "uncertainty/facets.h"
 #include "uncertainty/kink_search.h"
 #include "uncertainty/line_search.h"
 #include "uncertainty/local_search.h"
@@ -125,11 +126,11 @@ class Optimisation {
     }
     if (options_.search_classes) {
       if (is_first && options_.before_classes && !make_goals(true).empty()) {
-        options_.before_classes();
+        facets_ = options_.before_classes();
         note_new();
         recheck(false);
       }
-      if (is_first) search_from_best(true);
+      if (is_first) locate_facets(), search_from_best(true);
       recheck(true);
     }
     return conclude();
@@ -652,6 +653,49 @@ class Optimisation {
     if (std::ssize(known) > most) known.erase(known.begin(), known.end() - most);
   }
 
+  /// Of outcomes that are convex what bounds them is located before anything is searched for in them. Where an output
+  /// is linear there as well, that ends the search for its bounds.
+  void locate_facets() {
+    const Region& support = regions_.front();
+    if (!seeks_edges() || support.axes.size() < 2) return;
+    std::map<int, std::vector<Goal>> goals;
+    for (const Goal& goal : make_goals(true))
+      if (regions_[goal.level].axes == support.axes && find_best(goal).sample >= 0) goals[goal.outcome].push_back(goal);
+    for (const auto& [outcome, of_outcome] : goals)
+      if (!facets_.has_bends) locate_facets(outcome, of_outcome);
+  }
+
+  void locate_facets(int outcome, const std::vector<Goal>& goals) {
+    FacetSearch search(
+        regions_.front(), asker_, [outcome](const Result& r) { return outcome_of(r) == outcome; },
+        facets_.planes[outcome]);
+    const std::vector<FacetSearch::LinearFit> fits = search.fit_outputs();
+    if (fits.empty()) return;
+    std::vector<FacetSearch::Goal> wanted;
+    for (const Goal& goal : goals) {
+      wanted.push_back({regions_[goal.level], fits[goal.output].slope});
+      for (double& s : wanted.back().slope) s *= goal.sign;
+    }
+    search.run(wanted, asker_.rest() / 2);
+    facets_.has_bends = search.has_bend();
+    if (search.is_polyhedral()) {
+      std::vector<Boundary::Plane>& known = planes_[outcome];
+      for (Boundary::Plane& p : search.list_planes()) known.push_back(std::move(p));
+      for (std::size_t k = 0; k < goals.size(); ++k) {
+        const FacetSearch::LinearFit& fit = fits[goals[k].output];
+        const double close = 1e-5 * width_of(goals[k].output);
+        if (fit.largest_error > 1e-3 * close) continue;
+        const auto least = search.confirm(wanted[k]);
+        note_new();
+        const Candidate best = find_best(goals[k]);
+        if (!least || best.value > *least + goals[k].sign * fit.at_zero + close) continue;
+        double& end = ends_.try_emplace(key_of(goals[k]), infinite).first->second;
+        end = std::min(end, best.value);
+      }
+    }
+    note_new();
+  }
+
   /// Sides of jumps that were found in one cut, in all of them.
   void share_jumps() {
     std::vector<Point> points;
@@ -896,7 +940,7 @@ class Optimisation {
     std::vector<Running> all;
     for (const Goal& goal : make_goals(of_classes)) {
       const Candidate best = find_best(goal);
-      if (regions_[goal.level].axes.empty() || best.sample < 0) continue;
+      if (regions_[goal.level].axes.empty() || best.sample < 0 || (of_classes && is_converged(goal, best))) continue;
       if (!of_classes) starts_[key_of(goal)].push_back(best.sample);
       all.push_back({goal, make_model_search(goal, best, 0.1, of_classes ? 3 : 8)});
     }
@@ -998,6 +1042,7 @@ class Optimisation {
   std::vector<int> depth_;                              // per sample: in how many levels it lies
   std::vector<int> space_points_;                       // per level
   std::map<int, std::vector<Boundary::Plane>> planes_;  // of the boundaries of outcomes, latest last
+  Facets facets_;                                       // found before
   std::map<int, Jumps> jumps_;                          // by output
   std::map<Key, double> ends_;                          // best value at which a search converged
   std::set<std::pair<int, bool>> kinked_;               // output and sign

@@ -20,6 +20,7 @@
 
 #include "base/progress.h"
 #include "uncertainty/archive.h"
+#include "uncertainty/boundary.h"
 #include "uncertainty/space.h"
 
 namespace topple::uncertainty {
@@ -110,7 +111,7 @@ struct AlphaOptions {
   bool search_classes = true;
   /// Called once, when the bounds of all runs are searched and before those of each class where there are several:
   /// others may use the asker and set its limit.
-  std::function<void()> before_classes;
+  std::function<Facets()> before_classes;
   /// A search has converged when less than this part of the output's width is left to gain.
   double tolerance = 1e-8;
   /// Bounds of outputs that are not looked for by searches, but still reported from the archive (by index).

@@ -25,6 +25,11 @@ void Boundary::clear() {
   has_edges_ = is_turned_ = false;
 }
 
+double Boundary::calc_reach(const Plane& p, const Point& x) const {
+  const double part = p.error < 0 ? 1 : std::max(p.error / accuracy, 1e-3);
+  return part * std::max(p.reach, calc_offset(p.at, x));
+}
+
 /// Positive inside.
 double Boundary::calc_distance(const Plane& p, const Point& x) const {
   double rest = p.side.b;

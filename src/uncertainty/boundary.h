@@ -3,6 +3,7 @@
 /// meet (docs/theory/uncertainty.md, section 3).
 
 #include <algorithm>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -16,9 +17,10 @@ class Boundary {
  public:
   using Places = std::vector<const Point*>;
   struct Plane {
-    HalfSpace side;    // from the zero point, by widths
-    Point at;          // where it was found
-    double reach = 0;  // of the places that it was found by
+    HalfSpace side;     // from the zero point, by widths
+    Point at;           // where it was found
+    double reach = 0;   // of the places that it was found by
+    double error = -1;  // as a part of the distance from `at`; negative: what planes that are found on the way have
   };
 
   /// Lengths are measured in parts of `scale`, one per input; `axes` may vary. Planes that were found over more than
@@ -58,7 +60,7 @@ class Boundary {
  private:
   double calc_distance(const Plane&, const Point&) const;
   /// The length over which a plane is continued, of which its error is a part.
-  double calc_reach(const Plane& p, const Point& x) const { return std::max(p.reach, calc_offset(p.at, x)); }
+  double calc_reach(const Plane&, const Point&) const;
   bool leaves_out(const Plane&, const Point& from, double reach, const Places& inside) const;
   HalfSpace see(const Plane&, const Point& from, double margin) const;
 
@@ -68,6 +70,12 @@ class Boundary {
   std::vector<Plane> planes_;
   Plane latest_;
   bool has_edges_ = false, is_turned_ = false, has_kept_ = false;
+};
+
+/// Boundaries of outcomes that are planes, as far as they were looked at.
+struct Facets {
+  std::map<int, std::vector<Boundary::Plane>> planes;  // that bound an outcome
+  bool has_bends = false;  // one of them bends; as outcomes have boundaries in common no more is looked at
 };
 
 }  // namespace topple::uncertainty

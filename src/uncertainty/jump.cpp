@@ -9,10 +9,10 @@
 namespace topple::uncertainty {
 namespace {
 
-constexpr double accuracy = 0.01;            // of planes and slopes, by widths
-constexpr long most_sides = 100;             // that are kept
-constexpr std::size_t most_crossing = 5;     // planes whose pieces are looked into
-constexpr double margins[] = {0.02, 0.005};  // from planes, which are not known exactly
+constexpr double accuracy = 0.01;             // of planes and slopes, by widths
+constexpr long most_sides = 100;              // that are kept
+constexpr std::size_t most_crossing = 5;      // planes whose pieces are looked into
+constexpr double known_to[] = {0.02, 0.005};  // planes, from which places keep off
 
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
   double sum = 0;
@@ -45,6 +45,10 @@ bool is_alike(const JumpSide& a, const JumpSide& b) {
 }  // namespace
 
 std::vector<Point> find_places(const Region& region, const JumpSide& side) {
+  return find_places(region, side, known_to);
+}
+
+std::vector<Point> find_places(const Region& region, const JumpSide& side, std::span<const double> margins) {
   const Space& space = *region.space;
   const std::vector<double>& scale = region.scale;
   const std::vector<int>& axes = region.axes;

@@ -1,6 +1,7 @@
 #pragma once
 /// Jumps of a value between runs of one outcome (docs/theory/uncertainty.md, section 3): where else they may bound it.
 
+#include <span>
 #include <vector>
 
 #include "uncertainty/space.h"
@@ -18,7 +19,9 @@ struct JumpSide {
 };
 
 /// Places of a cut that tell whether it reaches such a side, and what there is best: the deepest one, and the best one
-/// if planes and slopes go on as they are. None where the cut ends before, or other inputs vary. They cost no runs.
+/// if planes and slopes go on as they are, so far off the planes. None where the cut ends before, or other inputs vary.
+/// They cost no runs.
+std::vector<Point> find_places(const Region&, const JumpSide&, std::span<const double> margins);
 std::vector<Point> find_places(const Region&, const JumpSide&);
 
 /// What is known of the jumps of one output.

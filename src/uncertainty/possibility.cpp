@@ -8,6 +8,7 @@
 
 #include "uncertainty/boundary.h"
 #include "uncertainty/cut_program.h"
+#include "uncertainty/facets.h"
 #include "uncertainty/linear.h"
 #include "uncertainty/random.h"
 #include "uncertainty/wall.h"
@@ -85,6 +86,7 @@ class Climb {
   }
 
   bool is_done() const { return stage_ == Stage::Done; }
+  const std::vector<Boundary::Plane>& facets() const { return facets_; }
   Possibility result(const Archive& archive) const {
     return {outcome_,  best_, std::min(resolution_, 1 - best_), sample_, count_above(space_, archive, best_),
             converged_};
@@ -96,6 +98,24 @@ class Climb {
     resolution_ = known.resolution, converged_ = true;
     stage_ = Stage::Done;
     return true;
+  }
+
+  /// Where planes bound the class, these, and from them its most possible place; false where it bends.
+  bool locate_facets(Asker& asker) {
+    refresh(asker.archive());
+    if (stage_ != Stage::Start || space_.has_interaction() || axes_.size() < 2 || axes_.size() > most_facet_axes ||
+        sample_ < 0 || best_ >= 1)
+      return true;
+    const Region support = make_region(space_, 0);
+    const auto before = options_.facets.planes.find(outcome_);
+    FacetSearch search(
+        support, asker, [this](const Result& r) { return options_.classify(r) == outcome_; },
+        before == options_.facets.planes.end() ? std::vector<Boundary::Plane>() : before->second);
+    search.run({{support, {}}}, asker.rest() / 8);
+    refresh(asker.archive());
+    if (search.is_polyhedral()) facets_ = search.list_planes();
+    is_bounded_ = search.is_polyhedral() && search.is_complete();
+    return !search.has_bend();
   }
 
   /// Takes notice of new samples.
@@ -237,6 +257,7 @@ class Climb {
     stage_ = axes_.size() < 2 || sample_ < 0 || walled_ == best_ ? Stage::Look : Stage::Wall;
     reach_ = largest_reach / 2, promised_ = 1, leads_ = 0, walled_from_ = best_;
     wall_.reset(), boundary_.clear(), tried_.clear(), turns_ = 0;
+    if (stage_ == Stage::Wall && !facets_.empty()) boundary_.adopt(facets_, best_x_, reach_, {});
   }
 
   Boundary::Places find_places(const Archive& archive, bool ours) const {
@@ -276,7 +297,8 @@ class Climb {
     if (!wall_) {
       const auto [nearest, is_explained] = find_beyond(archive);
       const bool promises_nothing = reach_ < 0.004 && promised_ < 0.1 * options_.tolerance;
-      if (nearest < 0 || promises_nothing || reach_ < smallest_reach || leads_++ >= most_leads) {
+      if (nearest < 0 || promises_nothing || (is_explained && is_bounded_) || reach_ < smallest_reach ||
+          leads_++ >= most_leads) {
         stage_ = best_ > walled_from_ + options_.tolerance ? Stage::Start : Stage::Look;
         walled_ = best_;
         return {};
@@ -462,10 +484,13 @@ class Climb {
   bool converged_ = false;
   std::optional<CutProgram> cut_;  // the support, with interaction
   std::optional<WallProbe> wall_;
-  Boundary boundary_;       // near the best place
-  std::vector<int> tried_;  // runs from which planes were looked for, since it moved
+  std::vector<Boundary::Plane> facets_;  // of a class that planes bound
+  bool is_bounded_ = false;              // by them, where it was most possible
+  Boundary boundary_;                    // near the best place
+  std::vector<int> tried_;               // runs from which planes were looked for, since it moved
   static constexpr double largest_reach = 0.2, smallest_reach = 1e-4;  // of a plane, by widths
   static constexpr int most_leads = 30;
+  static constexpr std::size_t most_facet_axes = 8;
   double reach_ = 0, promised_ = 0;
   double walled_ = -1, walled_from_ = 0;  // possibility at which walls have led no further; at which they began
   int leads_ = 0, turns_ = 0;             // turns: leads in a row that met another plane
@@ -489,6 +514,10 @@ PossibilityResult find_possibilities(const Space& space, Asker& asker, const Pos
   for (const Possibility& p : options.known)
     if (const auto climb = climbs.find(p.outcome); climb != climbs.end()) climb->second.take_known(asker.archive(), p);
   PossibilityResult result;
+  result.facets = options.facets;
+  for (auto& [c, climb] : climbs)
+    if (!result.facets.has_bends) result.facets.has_bends = !climb.locate_facets(asker);
+  note_classes();
   for (;;) {
     std::vector<Point> points;
     std::vector<Climb*> asking;
@@ -510,6 +539,7 @@ PossibilityResult find_possibilities(const Space& space, Asker& asker, const Pos
   for (auto& [c, climb] : climbs) {
     climb.refresh(asker.archive());
     result.classes.push_back(climb.result(asker.archive()));
+    if (!climb.facets().empty()) result.facets.planes[c] = climb.facets();
   }
   return result;
 }

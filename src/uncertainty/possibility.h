@@ -33,11 +33,13 @@ struct PossibilityOptions {
   std::vector<Possibility> known = {};
   Classify classify = outcome_of;
   std::vector<int> skipped = {};  // classes that another search looks for
+  Facets facets = {};             // of a call before
 };
 
 struct PossibilityResult {
   std::vector<Possibility> classes;  // by outcome, rising; all that the archive holds in the end
   Ending ending = Ending::Complete;
+  Facets facets;  // those of before, too
 };
 
 /// Starts from the archive's best samples of each class: bisects towards the core, slides along the boundary of the

@@ -10,6 +10,8 @@
 #include <set>
 
 #include "base/error.h"
+#include "uncertainty/cut_program.h"
+#include "uncertainty/local_search.h"
 #include "uncertainty/measures.h"
 
 namespace topple::uncertainty {
@@ -195,8 +197,35 @@ std::vector<Rank> calc_ranks(const std::vector<Driver>& drivers) {
   return ranks;
 }
 
+namespace {
+
+/// Within planes of an outcome the places of a space with an input known that are most possible, a little off the
+/// planes and less so.
+std::vector<Point> find_most_possible(const Space& known, const Space& space,
+                                      const std::vector<Boundary::Plane>& planes) {
+  const Region support = make_region(space, 0), slice = make_region(known, 0);
+  const Point corner = slice.box.lower;
+  std::vector<Point> places;
+  for (const double margin : {1e-5, 1e-7}) {
+    std::vector<HalfSpace> sides;
+    for (const Boundary::Plane& p : planes) {
+      HalfSpace side{{}, p.side.b - margin};
+      for (std::size_t k = 0; k < support.axes.size(); ++k) {
+        const int i = support.axes[k];
+        side.b -= p.side.a[k] * corner[i] / support.scale[i];
+        if (std::find(slice.axes.begin(), slice.axes.end(), i) != slice.axes.end()) side.a.push_back(p.side.a[k]);
+      }
+      sides.push_back(std::move(side));
+    }
+    places.push_back(uncertainty::find_most_possible(known, support.scale, slice.axes, corner, 1, sides));
+  }
+  return places;
+}
+
+}  // namespace
+
 std::vector<Fixed> find_outcomes_of_knowing(const Space& space, Asker& asker, const PossibilityOptions& options,
-                                            int limit, const std::vector<Fixed>& earlier) {
+                                            int limit, const std::vector<Fixed>& earlier, const Facets& facets) {
   check_space(space);
   std::vector<Fixed> effects;
   const int whole_limit = asker.limit();
@@ -235,6 +264,9 @@ std::vector<Fixed> find_outcomes_of_knowing(const Space& space, Asker& asker, co
     for (const auto& [outcome, top] : most)
       if (top.first < 1)
         for (Point& x : make_ray(space, asker.archive()[top.second].x, 9)) add(std::move(x));
+    for (const auto& [outcome, planes] : facets.planes)
+      for (Point& x : find_most_possible(known, space, planes))
+        if (calc_membership(known, x) > 0) add(std::move(x));
     asker.ask(points);
     Fixed f;
     f.input = i;

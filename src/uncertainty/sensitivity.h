@@ -75,7 +75,8 @@ std::vector<Fixed> find_effects_of_knowing(const Space&, Asker&, const AlphaResu
 /// and the search of possibility.h goes on from there. At most `limit` further points per input; possibilities are
 /// inner estimates. A class of which no run was found there has the possibility 0 and has not converged.
 ///   earlier  of a call before: what has converged there and still holds is not searched again
+///   facets   of outcomes, with all inputs fuzzy: within them the most possible place with an input known is run
 std::vector<Fixed> find_outcomes_of_knowing(const Space&, Asker&, const PossibilityOptions&, int limit,
-                                            const std::vector<Fixed>& earlier = {});
+                                            const std::vector<Fixed>& earlier = {}, const Facets& facets = {});
 
 }  // namespace topple::uncertainty
