@@ -312,7 +312,7 @@ bool FacetSearch::locate(const Way& given) {
 
 /// The plane through the end of a way and crossings around it; none where it has an edge or bends there.
 std::optional<FacetSearch::Facet> FacetSearch::find_facet(const Way& way, double radius) {
-  const auto& [in, out] = way;
+  const Place &in = way.first, &out = way.second;
   const std::size_t n = in.size();
   const double length = calc_length(in, out);
   std::vector<double> direction(n);
