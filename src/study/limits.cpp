@@ -32,7 +32,7 @@ uncertainty::Classify make_classes(const Limit& limit, const std::vector<std::st
   };
 }
 
-/// What is known of a limit, as a search that is no longer of one among many has it.
+/// What is known of breaking a limit, with the class that its own search gives it.
 std::vector<Possibility> find_known(const StudyResult& r, int limit) {
   for (Possibility k : r.limits)
     if (k.outcome == limit) {

@@ -16,12 +16,6 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double least_width = 1e-9;  // of the support: nearer places are one
 constexpr long most_planes = 200;     // the latest
 
-double dot(const std::vector<double>& a, const std::vector<double>& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
-  return sum;
-}
-
 /// Orthonormal directions along which all `rows` stay as they are, by Householder's reflections.
 std::vector<std::vector<double>> find_free_directions(const std::vector<std::vector<double>>& rows, std::size_t n) {
   std::vector<std::vector<double>> reflections;  // I - 2 h h'

@@ -24,14 +24,9 @@ constexpr std::size_t most_places = 60;    // of goals, at a time
 constexpr double aside = 0.2;              // of a way: how far another one ends beside it
 constexpr double least_turn = 0.02;        // of facets, 1 - cos
 constexpr int least_asked = 40;            // for each axis: with fewer no plane is located
+constexpr int most_aims = 4;               // directions in which a boundary is met
 constexpr int most_failed = 2;             // ways of which no plane was found
 constexpr int most_dropped = 3;            // planes that left out what is known
-
-double dot(const std::vector<double>& a, const std::vector<double>& b) {
-  double sum = 0;
-  for (std::size_t k = 0; k < a.size(); ++k) sum += a[k] * b[k];
-  return sum;
-}
 
 /// a + t (b - a)
 std::vector<double> blend(const std::vector<double>& a, const std::vector<double>& b, double t) {
@@ -46,20 +41,25 @@ double calc_length(const std::vector<double>& a, const std::vector<double>& b) {
   return std::sqrt(square);
 }
 
+/// The unit vector from a to b.
+std::vector<double> calc_direction(const std::vector<double>& a, const std::vector<double>& b) {
+  const double length = calc_length(a, b);
+  std::vector<double> direction(a.size());
+  for (std::size_t k = 0; k < a.size(); ++k) direction[k] = (b[k] - a[k]) / length;
+  return direction;
+}
+
 /// Unit vectors across a unit vector and each other; the first one is oblique to the axes.
 std::vector<std::vector<double>> make_tangents(const std::vector<double>& direction) {
   const std::size_t n = direction.size();
   std::vector<std::vector<double>> all = {direction};
-  for (std::size_t turn = 0; turn < 2 * n + 1 && all.size() < n; ++turn) {
+  for (std::size_t turn = 0; turn <= n && all.size() < n; ++turn) {
     std::vector<double> t(n, 0.0);
-    if (turn < n + 1)
-      for (std::size_t k = 0; k < n; ++k) t[k] = turn == 0 ? 1 + 0.3 * static_cast<double>(k) : k + 1 == turn ? 1 : 0;
-    if (turn == 0)
-      for (std::size_t k = 1; k < n; k += 2) t[k] = -t[k];
-    if (turn > n) t[turn - n - 1] = 1;
+    if (turn > 0) t[turn - 1] = 1;
+    for (std::size_t k = 0; turn == 0 && k < n; ++k) t[k] = (k % 2 == 0 ? 1 : -1) * (1 + 0.3 * static_cast<double>(k));
     for (const auto& other : all) {
       const double along = dot(t, other);
-      for (std::size_t k = 0; k < t.size(); ++k) t[k] -= along * other[k];
+      for (std::size_t k = 0; k < n; ++k) t[k] -= along * other[k];
     }
     const double length = std::sqrt(dot(t, t));
     if (length < 0.1) continue;
@@ -272,11 +272,9 @@ void FacetSearch::turn(Facet& f) {
 /// The way to a place beside its end; the same way if all of them are inside.
 FacetSearch::Way FacetSearch::move_aside(const Way& way) {
   const auto& [in, out] = way;
-  std::vector<double> direction = out;
   const double length = calc_length(in, out);
-  for (std::size_t k = 0; k < in.size(); ++k) direction[k] = (out[k] - in[k]) / length;
   std::vector<Place> places;
-  for (const auto& t : make_tangents(direction))
+  for (const auto& t : make_tangents(calc_direction(in, out)))
     for (const double sign : {1.0, -1.0}) {
       places.push_back(out);
       for (std::size_t k = 0; k < in.size(); ++k)
@@ -310,14 +308,13 @@ bool FacetSearch::locate(const Way& given) {
   return false;
 }
 
-/// The plane through the end of a way and crossings around it; none where it has an edge or bends there.
-std::optional<FacetSearch::Facet> FacetSearch::find_facet(const Way& way, double radius) {
+/// Ways across the boundary around the end of a given one, as it is met; none where they cannot be told.
+std::optional<FacetSearch::Aim> FacetSearch::aim(const Way& way, double radius) {
   const Place &in = way.first, &out = way.second;
   const std::size_t n = in.size();
-  const double length = calc_length(in, out);
-  std::vector<double> direction(n);
-  for (std::size_t k = 0; k < n; ++k) direction[k] = (out[k] - in[k]) / length;
-  Place anchor = blend(out, in, std::min(1.0, radius / length));
+  std::vector<double> direction = calc_direction(in, out);
+  Aim aim{blend(out, in, std::min(1.0, radius / calc_length(in, out))), {}, {}};
+  Place& anchor = aim.anchor;
   // a way needs an end that is outside; it goes as far as the support does
   const auto make_target = [&](const std::vector<double>& tangent, double sign) {
     Place x = out;
@@ -328,17 +325,16 @@ std::optional<FacetSearch::Facet> FacetSearch::find_facet(const Way& way, double
         part = std::min(part, std::max(0.0, ((step > 0 ? upper_[k] : lower_[k]) - anchor[k]) / step));
     return blend(anchor, x, part);
   };
-  std::vector<Place> targets;
-  std::vector<bool> inside;
-  for (int turn = 0; turn < 4; ++turn) {
+  for (int turn = 0; turn < most_aims; ++turn) {
     const std::vector<std::vector<double>> tangents = make_tangents(direction);
-    targets.clear();
+    aim.targets.clear();
     for (const auto& t : tangents)
-      for (const double sign : {1.0, -1.0}) targets.push_back(make_target(t, sign));
-    std::vector<Place> asked = targets;
+      for (const double sign : {1.0, -1.0}) aim.targets.push_back(make_target(t, sign));
+    std::vector<Place> asked = aim.targets;
     asked.push_back(anchor);
     const auto told = ask(asked);
     if (!told || !told->back()) return std::nullopt;
+    std::vector<bool>& inside = aim.inside;
     inside.assign(told->begin(), told->end() - 1);
     if (std::find(inside.begin(), inside.end(), true) == inside.end()) break;
     // what is inside on one side tells that the plane is met aslant
@@ -347,10 +343,21 @@ std::optional<FacetSearch::Facet> FacetSearch::find_facet(const Way& way, double
       for (std::size_t k = 0; k < n; ++k)
         turned[k] += (static_cast<double>(inside[2 * t + 1]) - static_cast<double>(inside[2 * t])) * tangents[t][k];
     const double size = std::sqrt(dot(turned, turned));
-    for (std::size_t k = 0; k < n; ++k) direction[k] = turned[k] / size, anchor[k] = out[k] - radius * direction[k];
-    for (std::size_t k = 0; k < n; ++k) anchor[k] = std::clamp(anchor[k], lower_[k], upper_[k]);
+    for (std::size_t k = 0; k < n; ++k) {
+      direction[k] = turned[k] / size;
+      anchor[k] = std::clamp(out[k] - radius * direction[k], lower_[k], upper_[k]);
+    }
   }
+  return aim;
+}
+
+/// The plane through the end of a way and crossings around it; none where it has an edge or bends there.
+std::optional<FacetSearch::Facet> FacetSearch::find_facet(const Way& way, double radius) {
+  const auto aimed = aim(way, radius);
+  if (!aimed) return std::nullopt;
+  const auto& [anchor, targets, inside] = *aimed;
   if (inside[0] || inside[1]) return std::nullopt;
+  const Place& out = way.second;
   // along the first tangent to both sides
   std::vector<Way> ways = {{anchor, targets[0]}, {anchor, targets[1]}};
   for (const double width : {coarse, fine})
@@ -363,26 +370,28 @@ std::optional<FacetSearch::Facet> FacetSearch::find_facet(const Way& way, double
   std::vector<Place> crossings = {out};
   for (const auto& [a, b] : ways) crossings.push_back(blend(a, b, 0.5));
   // the second one checks
-  const Place check = crossings[2];
-  crossings.erase(crossings.begin() + 2);
+  std::rotate(crossings.begin() + 2, crossings.begin() + 3, crossings.end());
   Facet facet{{fit_normal(crossings, anchor, radius), 0}, 2 * fine, {out}};
-  const std::vector<double>& normal = facet.side.a;
-  if (normal.empty()) return std::nullopt;
-  facet.side.b = dot(normal, out);
-  crossings.push_back(check);
-  // between places of different facets the outcome reaches beyond the plane through all of them
+  if (facet.side.a.empty() || reaches_behind(facet.side.a, crossings, radius)) return std::nullopt;
+  facet.side.b = dot(facet.side.a, out);
+  return facet;
+}
+
+/// Between places of different facets the outcome reaches beyond the plane through all of them.
+bool FacetSearch::reaches_behind(const std::vector<double>& normal, const std::vector<Place>& crossings,
+                                 double radius) {
   std::vector<Place> behind;
-  Place middle(n, 0.0);
+  Place middle(normal.size(), 0.0);
   for (std::size_t k = 0; k < crossings.size(); ++k) {
-    for (std::size_t j = 0; j < n; ++j) middle[j] += crossings[k][j] / static_cast<double>(crossings.size());
+    for (std::size_t j = 0; j < middle.size(); ++j)
+      middle[j] += crossings[k][j] / static_cast<double>(crossings.size());
     for (std::size_t m = 0; m < k; ++m) behind.push_back(blend(crossings[k], crossings[m], 0.5));
   }
-  behind.push_back(middle);
+  behind.push_back(std::move(middle));
   for (Place& x : behind)
-    for (std::size_t j = 0; j < n; ++j) x[j] += flat * radius * normal[j];
-  const auto reaches = ask(behind);
-  if (!reaches || std::find(reaches->begin(), reaches->end(), true) != reaches->end()) return std::nullopt;
-  return facet;
+    for (std::size_t j = 0; j < x.size(); ++j) x[j] += flat * radius * normal[j];
+  const auto inside = ask(behind);
+  return !inside || std::find(inside->begin(), inside->end(), true) != inside->end();
 }
 
 /// Whether two crossings and the one between them lie on a line. What misses it by a part of the radius that falls with

@@ -55,6 +55,11 @@ class FacetSearch {
     double error = 0;           // as a part of the distance from the nearest of
     std::vector<Place> pivots;  // places through which it goes
   };
+  struct Aim {
+    Place anchor;                // inside, in front of the boundary
+    std::vector<Place> targets;  // behind it, two for each tangent
+    std::vector<bool> inside;    // which of them are inside nevertheless
+  };
   Point to_point(const Place&) const;
   Place to_place(const Point&) const;
   std::vector<int> list_samples() const;
@@ -70,7 +75,9 @@ class FacetSearch {
   static void turn(Facet&);
   static double calc_error(const Facet&, const Place&);
   bool locate(const Way&);
+  std::optional<Aim> aim(const Way&, double radius);
   std::optional<Facet> find_facet(const Way&, double radius);
+  bool reaches_behind(const std::vector<double>& normal, const std::vector<Place>& crossings, double radius);
   bool is_straight(const std::vector<Way>&, const Place& middle, double radius, double width);
   void review();
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "uncertainty/cut_program.h"
+#include "uncertainty/linear.h"
 #include "uncertainty/local_search.h"
 
 namespace topple::uncertainty {
@@ -13,12 +14,6 @@ constexpr double accuracy = 0.01;             // of planes and slopes, by widths
 constexpr long most_sides = 100;              // that are kept
 constexpr std::size_t most_crossing = 5;      // planes whose pieces are looked into
 constexpr double known_to[] = {0.02, 0.005};  // planes, from which places keep off
-
-double dot(const std::vector<double>& a, const std::vector<double>& b) {
-  double sum = 0;
-  for (std::size_t k = 0; k < a.size(); ++k) sum += a[k] * b[k];
-  return sum;
-}
 
 HalfSpace turn_round(HalfSpace h) {
   for (double& a : h.a) a = -a;
