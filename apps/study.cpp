@@ -87,9 +87,10 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   StudyResult r;
   long answers = 0;
   const auto remove_new = [&] {
-    if (!is_new || !remove_unused(place, study::calc_model_hash(problem), answers)) return false;
+    return is_new && remove_unused(place, study::calc_model_hash(problem), answers);
+  };
+  const auto remove_empty_folder = [&] {
     if (is_new_folder) std::filesystem::remove(a.output, failure);  // what holds something stays
-    return true;
   };
   try {
     r = study::run_study(problem, make_factories(), options, progress, [&](const StudyState& s) {
@@ -113,9 +114,11 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
       complain(e, text, a.json);
     }
     remove_new();
+    remove_empty_folder();
     return kBadInput;
   } catch (const study::ConnectionLost& e) {
     line.clear();
+    remove_empty_folder();
     std::fprintf(stderr, "topple: the store is away: %s\nGive the same command again to go on.\n", e.what());
     if (a.json) print_failure(std::string("the store is away: ") + e.what());
     return kRunFailed;
@@ -124,6 +127,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
     std::fprintf(stderr, "topple: %s\n", e.what());
     if (!remove_new())
       std::fprintf(stderr, "What was run before is kept. Make room and give the same command again to go on.\n");
+    remove_empty_folder();
     if (a.json) print_failure(e.what());
     return kRunFailed;
   }
