@@ -1,7 +1,5 @@
 #include "uncertainty/alpha.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,11 +7,12 @@
 #include <memory>
 #include <set>
 
-#include "base/error.h"
 #include "uncertainty/facets.h"
 #include "uncertainty/kink_search.h"
+#include "uncertainty/levels.h"
 #include "uncertainty/line_search.h"
 #include "uncertainty/local_search.h"
+#include "uncertainty/starts.h"
 
 namespace topple::uncertainty {
 namespace {
@@ -24,23 +23,7 @@ constexpr int most_in_vain = 5;           // searches of one goal that neither e
 constexpr double least_edge_gain = 1e-6;  // along a kink, as a part of an output's width
 constexpr double least_line_gain = 1e-5;  // along an axis
 constexpr int most_line_places = 6;       // of an axis, that other ends of searches propose
-
-std::vector<double> check_levels(std::vector<double> levels) {
-  for (const double a : levels)
-    if (!(a >= 0 && a <= 1)) throw InputError("E807", fmt::format("level alpha = {}; levels lie between 0 and 1", a));
-  levels.push_back(0);
-  levels.push_back(1);
-  std::sort(levels.begin(), levels.end());
-  levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
-  return levels;
-}
-
-/// Number of the levels whose cut holds a sample: they are the first ones, because cuts are nested.
-int count_levels(const Space& space, const std::vector<double>& levels, const std::vector<Box>& boxes, const Point& x) {
-  int count = 0;
-  while (count < static_cast<int>(levels.size()) && is_in_cut(space, boxes[count], levels[count], x)) ++count;
-  return count;
-}
+constexpr double near_optimum = 0.02;     // of a cut's widths, within which a search would end there
 
 /// What is looked for: the least value of sign * output in the cut of a level, among one class or all.
 struct Goal {
@@ -53,6 +36,12 @@ struct Goal {
 struct Candidate {
   double value = infinite;
   int sample = -1;
+};
+
+/// A local optimum, and the level in whose cut it was found.
+struct Optimum {
+  int sample = -1;
+  int level = 0;
 };
 
 /// The state of one optimisation.
@@ -85,9 +74,11 @@ class Optimisation {
     note_new();
     unfinished_ = false;
     new_from_ = asker_.asked();
+    const std::vector<double> before = calc_bounds();
     spread(count / count_spread());
     if (!has_many_inputs()) search_dispersed();
     recheck(false);
+    has_gained(before);
     if (options_.search_classes) recheck(true);
     ++rounds_;
     return conclude();
@@ -318,8 +309,7 @@ class Optimisation {
       if (level != goal.level)
         if (const Candidate best = find_best({goal.output, level, goal.sign, goal.outcome}); best.sample >= 0)
           others.push_back(best.sample);
-    if (const auto ends = optima_.find({goal.output, goal.sign > 0}); ends != optima_.end())
-      others.insert(others.end(), ends->second.begin(), ends->second.end());
+    for (const Optimum& end : optima_[{goal.output, goal.sign > 0}]) others.push_back(end.sample);
     const Point& x = asker_.archive()[start.sample].x;
     for (const int i : r.axes) {
       std::vector<double> places;
@@ -385,53 +375,35 @@ class Optimisation {
     return best;
   }
 
-  /// The best samples of the cut that keep a distance from each other and from where searches for this goal began.
+  /// The best samples of the cut that keep a distance from each other, from where searches for this goal began and from
+  /// its known optima.
   std::vector<Candidate> find_starts(const Goal& goal, int count) {
     std::vector<Candidate> all;
     for (int i = 0; i < static_cast<int>(depth_.size()); ++i)
       if (depth_[i] > goal.level)
         if (const double v = value_of(goal, i); v < infinite) all.push_back({v, i});
     std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
-    std::vector<Candidate> starts;
     const Region& r = regions_[goal.level];
-    auto& used = starts_[key_of(goal)];
-    const double least = 0.2 * std::pow(0.7, rounds_);
-    // in widths of the cut, one sample behind the other
-    const std::size_t n = r.axes.size();
-    std::vector<double> at;
     const auto add_place = [&](std::vector<double>& list, int sample) {
       for (const int i : r.axes) list.push_back(asker_.archive()[sample].x[i] / (r.box.upper[i] - r.box.lower[i]));
     };
-    for (const auto& c : all) add_place(at, c.sample);
-    const auto distance_of = [n](const double* a, const double* b) {
-      double distance = 0;
-      for (std::size_t i = 0; i < n; ++i) distance = std::max(distance, std::abs(a[i] - b[i]));
-      return distance;
-    };
-    std::vector<double> used_at;
-    for (const int sample : used) add_place(used_at, sample);
-    // better than its neighbours: the flank of a valley that is known is no start
-    const auto is_bottom = [&](std::size_t k) {
-      const double* here = &at[k * n];
-      double nearest = infinite;
-      for (std::size_t j = 0; j < k; ++j) nearest = std::min(nearest, distance_of(&at[j * n], here));
-      std::size_t nearer = 0;
-      for (std::size_t j = k + 1; j < all.size() && nearer < 2 * n; ++j)
-        nearer += distance_of(&at[j * n], here) < nearest;
-      return nearer >= 2 * n;
-    };
+    RankedPlaces places{r.axes.size(), {}};
+    for (const Candidate& c : all) add_place(places.at, c.sample);
+    std::vector<double> taken;
+    for (const int sample : starts_[key_of(goal)]) add_place(taken, sample);
+    for (const Optimum& o : optima_[{goal.output, goal.sign > 0}])
+      if (is_optimum_of(o, goal)) add_place(taken, o.sample);
+    std::vector<Candidate> starts;
     for (const bool only_bottoms : {true, false}) {
       if (only_bottoms ? has_many_inputs() : (new_from_ > 0 || rounds_ >= options_.patience) && !has_many_inputs())
         continue;
-      for (std::size_t k = 0; k < all.size() && static_cast<int>(starts.size()) < count; ++k) {
-        if (all[k].sample < new_from_) continue;
-        bool is_apart = true;
-        for (std::size_t j = 0; j < used.size() && is_apart; ++j)
-          is_apart = distance_of(&used_at[j * n], &at[k * n]) > least;
-        if (!is_apart || (only_bottoms && !is_bottom(k))) continue;
+      const auto is_allowed = [&](std::size_t k) {
+        return all[k].sample >= new_from_ && (!only_bottoms || places.is_bottom(k));
+      };
+      for (const std::size_t k :
+           choose_apart(places, taken, 0.2 * std::pow(0.7, rounds_), count - starts.size(), is_allowed)) {
         starts.push_back(all[k]);
-        used.push_back(all[k].sample);
-        add_place(used_at, all[k].sample);
+        starts_[key_of(goal)].push_back(all[k].sample);
       }
     }
     return starts;
@@ -443,13 +415,19 @@ class Optimisation {
     for (const Goal& goal : make_goals(false)) values.push_back(find_best(goal).value);
     return values;
   }
-  bool has_gained(const std::vector<double>& before) const {
+  /// Whether a round gained anything; counts the rounds in a row in which a goal did not.
+  bool has_gained(const std::vector<double>& before) {
     const std::vector<Goal> goals = make_goals(false);
     const std::vector<double> now = calc_bounds();
     if (now.size() != before.size()) return true;
-    for (std::size_t k = 0; k < now.size(); ++k)
-      if (now[k] < before[k] - 1e-4 * width_of(goals[k].output)) return true;
-    return false;
+    bool is_better = false;
+    for (std::size_t k = 0; k < now.size(); ++k) {
+      const bool gains = now[k] < before[k] - 1e-4 * width_of(goals[k].output);
+      int& idle = idle_rounds_[key_of(goals[k])];
+      idle = gains ? 0 : idle + 1;
+      is_better = is_better || gains;
+    }
+    return is_better;
   }
 
   /// Width of an output over all samples.
@@ -466,9 +444,22 @@ class Optimisation {
   /// A local optimum: other starts keep a distance from it, and it is tried in the other cuts.
   void note_end(const Goal& goal, int sample) {
     if (goal.outcome != any_class) return;
-    starts_[key_of(goal)].push_back(sample);
-    auto& all = optima_[{goal.output, goal.sign > 0}];
-    if (std::find(all.begin(), all.end(), sample) == all.end()) all.push_back(sample);
+    std::vector<Optimum>& all = optima_[{goal.output, goal.sign > 0}];
+    if (std::none_of(all.begin(), all.end(),
+                     [&](const Optimum& o) { return o.sample == sample && o.level == goal.level; }))
+      all.push_back({sample, goal.level});
+  }
+
+  /// What is an optimum of a wide cut is one of a narrow one as well, and the other way round where no end of the
+  /// narrow one holds it.
+  bool is_optimum_of(const Optimum& o, const Goal& goal) const {
+    if (goal.outcome != any_class || depth_[o.sample] <= goal.level) return false;
+    const Region& r = regions_[o.level];
+    const Point& x = asker_.archive()[o.sample].x;
+    return o.level <= goal.level || (!space_.has_interaction() && std::all_of(r.axes.begin(), r.axes.end(), [&](int i) {
+             const double least = 1e-6 * r.scale[i];
+             return x[i] > r.box.lower[i] + least && x[i] < r.box.upper[i] - least;
+           }));
   }
 
   /// Where an output has kinks that bound it on this side, no model search tells that nothing better is near.
@@ -481,28 +472,29 @@ class Optimisation {
     std::erase_if(ends_, [&](const auto& e) { return is_of(e.first); });
   }
 
-  /// Whether searches for a bound ended at places of different values.
+  /// Whether searches for a bound ended at places of different values, or would have.
   bool has_valleys() const {
-    return !has_many_inputs() && std::any_of(optima_.begin(), optima_.end(), [this](const auto& of) {
-      const auto& [key, all] = of;
-      const double least = 1e-3 * width_of(key.first);
-      for (const int a : all)
-        for (const int b : all)
-          if (depth_[a] == depth_[b] && std::abs(asker_.archive()[a].result.values[key.first] -
-                                                 asker_.archive()[b].result.values[key.first]) > least)
-            return true;
-      return false;
-    });
+    return has_shallow_valleys_ || std::any_of(optima_.begin(), optima_.end(), [this](const auto& of) {
+             const auto& [key, all] = of;
+             const double least = 1e-3 * width_of(key.first);
+             const auto value = [&, output = key.first](const Optimum& o) {
+               return asker_.archive()[o.sample].result.values[output];
+             };
+             for (const Optimum& a : all)
+               for (const Optimum& b : all)
+                 if (depth_[a.sample] == depth_[b.sample] && std::abs(value(a) - value(b)) > least) return true;
+             return false;
+           });
   }
 
   /// Local optima of each cut, clipped, in the others: what is an optimum of a wide cut may be missed in a narrow one
   /// and the other way round.
   void share_optima() {
     std::vector<Point> points;
-    for (auto& [key, all] : optima_)
-      for (const int sample : all)
+    for (const auto& [key, all] : optima_)
+      for (const Optimum& o : all)
         for (const Region& r : regions_) {
-          Point x = clip(r.box, asker_.archive()[sample].x);
+          Point x = clip(r.box, asker_.archive()[o.sample].x);
           if (!space_.has_interaction() || r.contains(x)) points.push_back(std::move(x));
         }
     ask(points);
@@ -531,8 +523,29 @@ class Optimisation {
     std::unique_ptr<LocalSearch> search;
     bool over_faces = false;
     bool of_restart = false;  // refines where a search over the faces ended
+    bool may_stop = false;    // where that is vain
+    bool has_stopped = false;
     double start = search ? search->value() : infinite;
   };
+
+  /// Whether a search from another place ended, or will end, where nothing is to be found any more: beside a known
+  /// optimum, or in a valley that will stay worse than the best place.
+  bool is_vain(const Running& r) {
+    const Point& x = r.search->best();
+    const Region& region = regions_[r.goal.level];
+    for (const Optimum& o : optima_[{r.goal.output, r.goal.sign > 0}]) {
+      if (!is_optimum_of(o, r.goal) || value_of(r.goal, o.sample) > r.search->value()) continue;
+      const Point& y = asker_.archive()[o.sample].x;
+      if (x != y && std::all_of(region.axes.begin(), region.axes.end(), [&](int i) {
+            return std::abs(x[i] - y[i]) < near_optimum * (region.box.upper[i] - region.box.lower[i]);
+          }))
+        return true;
+    }
+    const bool is_shallow = static_cast<const ModelSearch&>(*r.search).calc_outlook() >
+                            find_best(r.goal).value + 1e-3 * width_of(r.goal.output);
+    has_shallow_valleys_ = has_shallow_valleys_ || is_shallow;
+    return is_shallow;
+  }
 
   std::unique_ptr<LocalSearch> make_model_search(const Goal& goal, const Candidate& start, double radius, int probes) {
     ModelSearch::Options o;
@@ -540,6 +553,7 @@ class Optimisation {
     o.probes = probes;
     o.tolerance = options_.tolerance * width_of(goal.output);
     if (seeks_edges()) o.edge = 1e-3;
+    o.doubts_edges = !has_kinks(goal);
     o.seed = options_.seed + ++searches_;
     const Region& region = regions_[goal.level];
     const Point& from = asker_.archive()[start.sample].x;
@@ -589,11 +603,12 @@ class Optimisation {
     while (asker_.can_go_on()) {
       std::vector<Point> points;
       for (const auto& r : all)
-        if (!r.search->is_done()) points.insert(points.end(), r.search->pending().begin(), r.search->pending().end());
+        if (!r.search->is_done() && !r.has_stopped)
+          points.insert(points.end(), r.search->pending().begin(), r.search->pending().end());
       if (points.empty()) break;
       ask(points);
       for (auto& r : all) {
-        if (r.search->is_done()) continue;
+        if (r.search->is_done() || r.has_stopped) continue;
         std::vector<Told> told;
         bool complete = true;
         for (const auto& x : r.search->pending()) {
@@ -603,9 +618,16 @@ class Optimisation {
         }
         // a search that was cut off by the limit or a cancellation must not conclude from what is missing
         if (complete) r.search->tell(told);
+        r.has_stopped = complete && r.may_stop && !r.search->is_done() && is_vain(r);
       }
     }
     for (const auto& r : all) {
+      const auto* model = dynamic_cast<const ModelSearch*>(r.search.get());
+      if (model && model->is_wavy()) wavy_.insert({r.goal.output, r.goal.sign > 0});
+      if (r.has_stopped) {
+        if (const int at = asker_.archive().find(r.search->best()); at >= 0) starts_[key_of(r.goal)].push_back(at);
+        continue;
+      }
       if (!r.search->is_done()) unfinished_ = true;
       const bool is_kink = dynamic_cast<const KinkSearch*>(r.search.get()) != nullptr;
       if (is_kink && r.search->is_done() && !r.search->is_converged()) {
@@ -615,7 +637,6 @@ class Optimisation {
         double& end = (is_over ? given_up_ : edges_).try_emplace(key_of(r.goal), infinite).first->second;
         end = std::min(end, r.search->value());
       }
-      const auto* model = dynamic_cast<const ModelSearch*>(r.search.get());
       if (model && model->is_at_jump())
         jumps_[r.goal.output].add(model->get_side());
       else if (model)
@@ -719,8 +740,15 @@ class Optimisation {
   /// What a bound is marked with.
   bool is_settled(const Goal& goal, const Candidate& best) const {
     if (!is_converged(goal, best)) return false;
-    if (!is_open(goal.level)) return is_scanned(goal, best);
+    if (!is_open(goal.level)) return is_scanned(goal, best) && is_explored(goal);
     return is_checked(goal, best) && (goal.outcome != any_class || is_confirmed(goal, best));
+  }
+
+  /// Where values vary within much less than what lies between spread runs, rounds must have gained nothing.
+  bool is_explored(const Goal& goal) const {
+    if (goal.outcome != any_class || has_kinks(goal) || !wavy_.contains({goal.output, goal.sign > 0})) return true;
+    const auto idle = idle_rounds_.find(key_of(goal));
+    return idle != idle_rounds_.end() && idle->second >= options_.patience;
   }
 
   bool is_all_settled() const {
@@ -954,22 +982,24 @@ class Optimisation {
     for (const Goal& goal : make_goals(false)) {
       if (regions_[goal.level].axes.empty()) continue;
       for (const auto& start : find_starts(goal, has_many_inputs() ? 1 : options_.starts))
-        all.push_back({goal, make_model_search(goal, start, 0.1, 1)}), has_starts = true;
+        all.push_back({goal, make_model_search(goal, start, 0.1, 1), false, false, !has_many_inputs()}),
+            has_starts = true;
       if (const Candidate best = find_best(goal); best.sample >= 0 && rounds_ == 0 && !has_many_inputs())
         for (int k = 0; k < options_.evolutions; ++k) all.push_back({goal, make_evolution(goal, best)});
     }
     std::vector<std::pair<Goal, std::size_t>> known;  // optima before
-    for (const Goal& goal : make_goals(false)) known.push_back({goal, starts_[key_of(goal)].size()});
+    for (const Goal& goal : make_goals(false)) known.push_back({goal, optima_[{goal.output, goal.sign > 0}].size()});
     advance(all);
     // an end at a kink that is nearly as good as the best one may be a better valley
     for (const auto& [goal, count] : known) {
       if (!has_kinks(goal)) continue;
       const Candidate best = find_best(goal);
-      const std::vector<int>& samples = starts_[key_of(goal)];
-      for (std::size_t k = count; k < samples.size(); ++k)
-        if (const double v = value_of(goal, samples[k]);
-            samples[k] != best.sample && v < best.value + 0.02 * width_of(goal.output))
-          all.push_back({goal, make_kink_search(goal, {v, samples[k]})});
+      const std::vector<Optimum>& ends = optima_[{goal.output, goal.sign > 0}];
+      for (std::size_t k = count; k < ends.size(); ++k)
+        if (const double v = value_of(goal, ends[k].sample); ends[k].level == goal.level &&
+                                                             ends[k].sample != best.sample &&
+                                                             v < best.value + 0.02 * width_of(goal.output))
+          all.push_back({goal, make_kink_search(goal, {v, ends[k].sample})});
     }
     advance(all);
     return has_starts;
@@ -1049,8 +1079,11 @@ class Optimisation {
   std::map<Key, double> given_up_;          // at which searches along kinks neither ended nor gained any more
   std::map<Key, int> in_vain_;              // searches along kinks that did not end, nor gain
   std::map<Key, double> edges_;             // at which one stopped before a kink
-  std::map<Key, std::vector<int>> starts_;  // samples from which searches began and, with few inputs, ended
-  std::map<std::pair<int, bool>, std::vector<int>> optima_;  // samples, by output and sign
+  std::map<Key, std::vector<int>> starts_;  // samples from which searches began, or at which they stopped
+  std::map<std::pair<int, bool>, std::vector<Optimum>> optima_;  // by output and sign
+  std::set<std::pair<int, bool>> wavy_;                          // the same: values vary within little
+  std::map<Key, int> idle_rounds_;                               // in a row, that gained nothing
+  bool has_shallow_valleys_ = false;                             // that searches were stopped in
   std::map<Key, Faces> faces_;
   std::map<Key, std::vector<int>> scanned_;  // samples through which lines led to no better basin
   int next_spread_ = 1;
@@ -1061,16 +1094,7 @@ class Optimisation {
   bool is_done_ = false;  // but for rounds that only make surer
 };
 
-OutputBounds make_empty_bounds(const std::vector<double>& levels) {
-  OutputBounds b;
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (const double a : levels) b.levels.push_back({a, {nan, -1, false}, {nan, -1, false}});
-  return b;
-}
-
 }  // namespace
-
-double calc_miss_probability(const Coverage& c, double v) { return std::pow(1 - v, c.space_points); }
 
 AlphaOptions make_thrifty_options() {
   AlphaOptions o;
@@ -1081,57 +1105,6 @@ AlphaOptions make_thrifty_options() {
   o.lines = 0;
   o.search_classes = false;
   return o;
-}
-
-std::string to_text(Ending e) {
-  switch (e) {
-    case Ending::Complete:
-      return "complete";
-    case Ending::LimitReached:
-      return "limit of evaluations reached";
-    case Ending::Cancelled:
-      return "cancelled";
-    case Ending::NotConverged:
-      return "some searches have not converged";
-  }
-  return {};
-}
-
-AlphaResult read_archive(const Space& space, const Archive& archive, const std::vector<double>& given,
-                         const std::vector<int>& space_points) {
-  const std::vector<double> levels = check_levels(given);
-  std::vector<Box> boxes;
-  for (const double a : levels) boxes.push_back(make_box(space, a));
-  AlphaResult result;
-  for (std::size_t k = 0; k < levels.size(); ++k)
-    result.coverage.push_back({levels[k], 0, k < space_points.size() ? space_points[k] : 0});
-  std::map<int, ClassBounds> classes;
-  const auto take = [](Bound& bound, double value, int sample, bool lower) {
-    if (bound.sample < 0 || (lower ? value < bound.value : value > bound.value)) bound = {value, sample, false};
-  };
-  for (int i = 0; i < static_cast<int>(archive.size()); ++i) {
-    const Sample& s = archive[i];
-    const int depth = count_levels(space, levels, boxes, s.x);
-    if (depth == 0) continue;
-    ClassBounds& c = classes[outcome_of(s.result)];
-    c.outcome = outcome_of(s.result);
-    ++c.count;
-    if (const double mu = calc_membership(space, s.x); mu > c.possibility || c.sample < 0)
-      c.possibility = mu, c.sample = i;
-    for (int k = 0; k < depth; ++k) ++result.coverage[k].samples;
-    const std::size_t outputs = s.result.values.size();
-    if (result.outputs.size() < outputs) result.outputs.assign(outputs, make_empty_bounds(levels));
-    if (c.outputs.size() < outputs) c.outputs.assign(outputs, make_empty_bounds(levels));
-    for (std::size_t o = 0; o < outputs; ++o)
-      for (int k = 0; k < depth; ++k)
-        for (auto* bounds : {&result.outputs[o].levels[k], &c.outputs[o].levels[k]}) {
-          take(bounds->lower, s.result.values[o], i, true);
-          take(bounds->upper, s.result.values[o], i, false);
-        }
-  }
-  for (auto& [outcome, c] : classes) result.classes.push_back(std::move(c));
-  result.failed = archive.count_failed();
-  return result;
 }
 
 struct AlphaSearch::Parts {
@@ -1162,21 +1135,6 @@ AlphaResult optimise(const Space& space, const Evaluate& evaluate, const AlphaOp
 AlphaResult optimise(const std::vector<FuzzyNumber>& inputs, const Evaluate& evaluate, const AlphaOptions& options,
                      const Progress& progress) {
   return optimise(Space{inputs, {}, {}}, evaluate, options, progress);
-}
-
-FuzzyNumber make_number(const OutputBounds& bounds) {
-  std::vector<AlphaCut> cuts;
-  for (const auto& level : bounds.levels) {
-    if (level.lower.sample < 0) throw InputError("E805", fmt::format("no run gave a value at alpha = {}", level.alpha));
-    cuts.push_back({level.alpha, level.lower.value, level.upper.value});
-  }
-  return FuzzyNumber(std::move(cuts));
-}
-
-FuzzyNumber make_number(const AlphaResult& result, int output) {
-  if (output < 0 || output >= static_cast<int>(result.outputs.size()))
-    throw InputError("E805", fmt::format("there is no output {} among {}", output, result.outputs.size()));
-  return make_number(result.outputs[output]);
 }
 
 }  // namespace topple::uncertainty

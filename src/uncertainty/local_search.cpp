@@ -609,6 +609,7 @@ void ModelSearch::ask_trials() {
 void ModelSearch::finish_iteration() {
   ++iteration_;
   const double gained = value_ - next_value_;
+  earlier_gain_ = last_gain_, last_gain_ = gained;
   const double length = calc_offset(next_, best_, region_.axes, region_.scale);
   if (next_outcome_ != outcome_) walls_.clear(), insides_.clear(), boundary_.clear();
   if (length > 0) tried_.clear();
@@ -631,6 +632,20 @@ void ModelSearch::finish_iteration() {
                        radius_ <= (is_bound_  ? (boundary_.has_edges() ? 3e-4 : 0.003)
                                    : any_free ? 0.01
                                               : 0.03);
+  // a valley that is narrower than the stars before looks like a kink
+  if (options_.doubts_edges && settled && is_bent() && !is_bend_checked_) {
+    is_bend_checked_ = true;
+    radius_ *= 0.25;
+    ask_star();
+    return;
+  }
+  const bool good = gained > 0 && gained >= 0.5 * promised_;
+  if (options_.doubts_edges && !settled && good && !has_met_walls_ && radius_ < options_.edge && !is_edge_checked_) {
+    is_edge_checked_ = true;
+    radius_ = options_.edge, trust_ = std::max(2 * length, 2 * radius_);
+    ask_star();
+    return;
+  }
   if (settled || radius_ < (has_met_walls_ ? options_.smallest : std::max(options_.smallest, options_.edge))) {
     // where a boundary stops it that is not located any more, the way along it may lead on
     converged_ = settled || wall_ || probes_ < most_probes() || promised_ <= tolerance ||
@@ -640,7 +655,6 @@ void ModelSearch::finish_iteration() {
     look_for_jump((settled ? 1e5 : 100) * options_.tolerance);
     return;
   }
-  const bool good = gained > 0 && gained >= 0.5 * promised_;
   if (good && length >= 0.99 * trust_) {
     trust_ *= 2;
   } else {
@@ -648,6 +662,10 @@ void ModelSearch::finish_iteration() {
     trust_ = good ? std::max(2 * length, 2 * radius_) : std::max(0.5 * length, 2 * radius_);
   }
   ask_star();
+}
+
+double ModelSearch::calc_outlook() const {
+  return iteration_ >= 2 && last_gain_ <= 0.5 * earlier_gain_ ? value_ - 3 * last_gain_ : -infinite;
 }
 
 // ---- jumps of the value

@@ -66,13 +66,14 @@ class LocalSearch {
 class ModelSearch : public LocalSearch {
  public:
   struct Options {
-    double radius = 0.1;      // of the first star, as a part of the support's width
-    double tolerance = 1e-8;  // of the value, absolute; decides when it has converged
-    double smallest = 1e-5;   // radius at which it ends anyway
-    double edge = 0;          // the same where no other outcome was met
-    int iterations = 60;      // at most
-    int probes = 8;           // of the boundary of another outcome, at most
-    std::uint64_t seed = 1;   // for the subproblem under constraints
+    double radius = 0.1;        // of the first star, as a part of the support's width
+    double tolerance = 1e-8;    // of the value, absolute; decides when it has converged
+    double smallest = 1e-5;     // radius at which it ends anyway
+    double edge = 0;            // the same where no other outcome was met
+    bool doubts_edges = false;  // a nearer star tells kinks from narrow valleys
+    int iterations = 60;        // at most
+    int probes = 8;             // of the boundary of another outcome, at most
+    std::uint64_t seed = 1;     // for the subproblem under constraints
   };
   ModelSearch(Region region, Point start, const Told& at_start, const Options& options);
   void tell(std::span<const Told> told) override;
@@ -84,6 +85,10 @@ class ModelSearch : public LocalSearch {
   int outcome() const { return outcome_; }
   /// Whether it ended where the mapping is not smooth: the radius became too small, or curvatures grew as it did.
   bool is_at_edge() const { return at_edge_; }
+  /// Whether it ended where the mapping is smooth, but only within much less than its first star.
+  bool is_wavy() const { return converged_ && !at_edge_ && (is_bend_checked_ || is_edge_checked_); }
+  /// What it may come to, as its gains shrink; -infinity as long as they do not.
+  double calc_outlook() const;
   bool has_met_walls() const { return has_met_walls_; }
   /// Whether its boundary is that of a jump of the value, of which outcomes do not tell.
   bool is_at_jump() const { return jump_ > 0; }
@@ -164,6 +169,9 @@ class ModelSearch : public LocalSearch {
   double along_ = 1;       // least part of what is promised here that a located boundary leaves
   int iteration_ = 0, probes_ = 0;
   bool at_edge_ = false, has_met_walls_ = false;
+  bool is_bend_checked_ = false;  // with a nearer star
+  bool is_edge_checked_ = false;  // by another iteration at its radius
+  double last_gain_ = 0, earlier_gain_ = 0;
   enum class Stage { Star, Inner, Probe, Trial, Section } stage_ = Stage::Star;
   std::vector<Point> walls_;    // places of other outcomes, latest last
   Place inner_;                 // about which slopes are looked for that the star does not tell

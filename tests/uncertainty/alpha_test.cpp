@@ -456,6 +456,33 @@ TEST(AlphaPhysics, InputsThatActAloneAreExactOrMarked) {
   }
 }
 
+// Some 400 hills whose heights differ by little, narrower than what lies between spread runs; the bounds are those of
+// a grid of 4,000 x 4,000, refined.
+TEST(AlphaPhysics, HillsNarrowerThanSpreadRunsAreFound) {
+  const auto model = make_evaluate_values([](const Point& x) {
+    return std::vector{std::sin(3 * x[0] + 2 * x[1] * x[1]) * std::cos(4 * x[1] - x[0]) + 0.05 * x[0]};
+  });
+  const std::vector<FuzzyNumber> inputs = {make_triangular(-4, -0.9, 4), make_triangular(-4, 0.7, 4)};
+  const std::vector<std::pair<double, double>> bounds = {{-1.1881244119, 1.1970693358},
+                                                         {-1.1597222557, 1.1378644174},
+                                                         {-1.0932641616, 1.0728122765},
+                                                         {-1.0832257046, 0.9626184660}};
+  int off = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    AlphaOptions options;
+    options.seed = seed;
+    const AlphaResult r = optimise(inputs, model, options, {});
+    for (std::size_t k = 0; k < bounds.size(); ++k) {
+      const LevelBounds& l = r.outputs[0].levels[k];
+      EXPECT_GE(l.lower.value, bounds[k].first - 1e-9);
+      EXPECT_LE(l.upper.value, bounds[k].second + 1e-9);
+      off += l.lower.value > bounds[k].first + 2.4e-4;
+      off += l.upper.value < bounds[k].second - 2.4e-4;
+    }
+  }
+  EXPECT_LE(off, 16) << "of 64 bounds";
+}
+
 // ---- more inputs than all corners are run of
 
 struct Ends {

@@ -191,6 +191,56 @@ TEST(KinkSearch, FindsTheLowestPlaceOfPlanes) {
   }
 }
 
+// In a valley that is narrower than the first star curvatures grow as stars shrink, as they do at a kink.
+TEST(ModelSearch, TellsNarrowValleysFromKinks) {
+  const Space space = make_cube(2);
+  const Model waves = [](const Point& x) {
+    return Told{std::sin(6 * x[0] + 4 * x[1] * x[1]) * std::cos(8 * x[1] - 2 * x[0]) + 0.05 * x[0], 0};
+  };
+  const Model kink = [](const Point& x) {
+    return Told{std::abs(x[0] - 0.3 * x[1]) + 2 * std::abs(x[1] + 0.2 * x[0]), 0};
+  };
+  ModelSearch::Options options;
+  options.edge = 1e-3;
+  int misled = 0;
+  Random random(3);
+  for (int k = 0; k < 100; ++k) {
+    const Point start = {random.next(-1.9, 1.9), random.next(-1.9, 1.9)};
+    for (const bool doubts : {false, true}) {
+      options.doubts_edges = doubts;
+      ModelSearch smooth(make_region(space, 0), start, waves(start), options);
+      drive(smooth, waves);
+      if (doubts)
+        EXPECT_TRUE(smooth.is_converged() && !smooth.is_at_edge()) << "from " << start[0] << ", " << start[1];
+      else
+        misled += smooth.is_at_edge() ? 1 : 0;
+      ModelSearch bent(make_region(space, 0), start, kink(start), options);
+      drive(bent, kink);
+      EXPECT_TRUE(bent.is_at_edge() && !bent.is_wavy()) << "from " << start[0] << ", " << start[1];
+    }
+  }
+  EXPECT_GE(misled, 20) << "nothing that could mislead";
+}
+
+TEST(ModelSearch, ForetellsWhatItMayComeTo) {
+  const Space space = make_cube(2);
+  const Model model = [](const Point& x) { return Told{std::cosh(x[0] - 0.2) + std::cosh(1.5 * (x[1] + 0.1)), 0}; };
+  const Point start = {1.5, 1.2};
+  ModelSearch search(make_region(space, 0), start, model(start), {});
+  EXPECT_EQ(search.calc_outlook(), -std::numeric_limits<double>::infinity());
+  int foretold = 0;
+  while (!search.is_done()) {
+    std::vector<Told> told;
+    for (const Point& x : search.pending()) told.push_back(model(x));
+    search.tell(told);
+    if (!std::isfinite(search.calc_outlook())) continue;
+    ++foretold;
+    EXPECT_LE(search.calc_outlook(), 2 + 1e-9);
+  }
+  EXPECT_GE(foretold, 2);
+  EXPECT_NEAR(search.calc_outlook(), 2, 1e-6);
+}
+
 TEST(KinkSearch, FollowsAnEdgeThatNoAxisImproves) {
   const Space space = make_cube(3);
   const Model model = [](const Point& x) {
