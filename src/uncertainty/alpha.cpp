@@ -567,7 +567,7 @@ class Optimisation {
     }
     std::sort(near.begin(), near.end());
     for (const auto& [distance, i] : near) search->remember(asker_.archive()[i].x, tell_of(goal, i));
-    if (goal.outcome != any_class) search->adopt(planes_[search->outcome()]);
+    if (goal.outcome != any_class) search->adopt(planes_[{search->outcome(), region.axes}]);
     return search;
   }
 
@@ -640,7 +640,7 @@ class Optimisation {
       if (model && model->is_at_jump())
         jumps_[r.goal.output].add(model->get_side());
       else if (model)
-        note_planes(*model);
+        note_planes(*model, regions_[r.goal.level].axes);
       if (!r.search->is_converged()) continue;
       if (dynamic_cast<const LineSearch*>(r.search.get()) != nullptr) {
         if (const int at = asker_.archive().find(r.search->best()); at >= 0) scanned_[key_of(r.goal)].push_back(at);
@@ -663,9 +663,9 @@ class Optimisation {
     all.clear();
   }
 
-  /// The boundary of an outcome is the same for all outputs and levels.
-  void note_planes(const ModelSearch& search) {
-    std::vector<Boundary::Plane>& known = planes_[search.outcome()];
+  /// The boundary of an outcome is the same for all outputs, and for levels in which the same inputs vary.
+  void note_planes(const ModelSearch& search, const std::vector<int>& axes) {
+    std::vector<Boundary::Plane>& known = planes_[{search.outcome(), axes}];
     for (const auto& p : search.boundary().planes()) {
       std::erase_if(known, [&p](const Boundary::Plane& q) { return q.side.a == p.side.a && q.side.b == p.side.b; });
       known.push_back(p);
@@ -700,7 +700,7 @@ class Optimisation {
     search.run(wanted, asker_.rest() / 2);
     facets_.has_bends = search.has_bend();
     if (search.is_polyhedral()) {
-      std::vector<Boundary::Plane>& known = planes_[outcome];
+      std::vector<Boundary::Plane>& known = planes_[{outcome, regions_.front().axes}];
       for (Boundary::Plane& p : search.list_planes()) known.push_back(std::move(p));
       for (std::size_t k = 0; k < goals.size(); ++k) {
         const FacetSearch::LinearFit& fit = fits[goals[k].output];
@@ -1069,13 +1069,14 @@ class Optimisation {
   std::vector<double> levels_;
   std::vector<Region> regions_;
   std::vector<Box> boxes_;
-  std::vector<int> depth_;                              // per sample: in how many levels it lies
-  std::vector<int> space_points_;                       // per level
-  std::map<int, std::vector<Boundary::Plane>> planes_;  // of the boundaries of outcomes, latest last
-  Facets facets_;                                       // found before
-  std::map<int, Jumps> jumps_;                          // by output
-  std::map<Key, double> ends_;                          // best value at which a search converged
-  std::set<std::pair<int, bool>> kinked_;               // output and sign
+  std::vector<int> depth_;         // per sample: in how many levels it lies
+  std::vector<int> space_points_;  // per level
+  // of the boundaries of outcomes, by outcome and inputs that vary, latest last
+  std::map<std::pair<int, std::vector<int>>, std::vector<Boundary::Plane>> planes_;
+  Facets facets_;                           // found before
+  std::map<int, Jumps> jumps_;              // by output
+  std::map<Key, double> ends_;              // best value at which a search converged
+  std::set<std::pair<int, bool>> kinked_;   // output and sign
   std::map<Key, double> given_up_;          // at which searches along kinks neither ended nor gained any more
   std::map<Key, int> in_vain_;              // searches along kinks that did not end, nor gain
   std::map<Key, double> edges_;             // at which one stopped before a kink

@@ -113,15 +113,16 @@ std::vector<JumpSide> Jumps::take_new() {
     const JumpSide& side = sides_[taken_];
     all.push_back(side);
     if (side.in.size() == 1) all.push_back({side.axes, {turn_round(side.in[0])}, side.slope});
+    std::vector<HalfSpace>& planes = planes_[side.axes];
     for (const HalfSpace& h : side.in) {
       const auto is_known = [&h](const HalfSpace& p) { return is_alike(p, h) || is_alike(p, turn_round(h)); };
-      if (std::any_of(planes_.begin(), planes_.end(), is_known)) continue;
-      planes_.push_back(h);
-      const std::size_t count = std::min(planes_.size(), most_crossing), first = planes_.size() - count;
+      if (std::any_of(planes.begin(), planes.end(), is_known)) continue;
+      planes.push_back(h);
+      const std::size_t count = std::min(planes.size(), most_crossing), first = planes.size() - count;
       for (std::size_t turned = 0; count > 1 && turned < std::size_t{1} << count; ++turned) {
         JumpSide piece{side.axes, {}, side.slope};
         for (std::size_t k = 0; k < count; ++k)
-          piece.in.push_back(turned >> k & 1 ? turn_round(planes_[first + k]) : planes_[first + k]);
+          piece.in.push_back(turned >> k & 1 ? turn_round(planes[first + k]) : planes[first + k]);
         all.push_back(piece);
         for (double& s : piece.slope) s = -s;
         all.push_back(std::move(piece));

@@ -1,6 +1,7 @@
 #pragma once
 /// Jumps of a value between runs of one outcome (docs/theory/uncertainty.md, section 3): where else they may bound it.
 
+#include <map>
 #include <span>
 #include <vector>
 
@@ -35,7 +36,7 @@ class Jumps {
  private:
   std::vector<JumpSide> sides_;
   std::size_t taken_ = 0;
-  std::vector<HalfSpace> planes_;
+  std::map<std::vector<int>, std::vector<HalfSpace>> planes_;  // by the inputs that vary
 };
 
 }  // namespace topple::uncertainty

@@ -456,6 +456,30 @@ TEST(AlphaPhysics, InputsThatActAloneAreExactOrMarked) {
   }
 }
 
+// At alpha = 1 plateaus vary and points do not, so planes of jumps and of outcomes are found in other spaces there.
+TEST(AlphaPhysics, CoresOfBothKindsBesideJumps) {
+  const std::vector<FuzzyNumber> inputs = {make_triangular(0, .45, 1), make_trapezoidal(0, .3, .7, 1),
+                                           make_triangular(0, .55, 1), make_trapezoidal(0, .2, .6, 1)};
+  for (const bool has_names : {false, true}) {
+    const Evaluate model = [has_names](std::span<const Point> points, std::span<Result> out) {
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const Point& x = points[i];
+        const bool first = .5 * x[0] + .7 * x[1] - .4 * x[2] + .3 * x[3] > .55,
+                   second = x[3] - .6 * x[1] + .2 * x[0] > .3;
+        out[i].state = Result::State::Done;
+        out[i].outcome = has_names ? first + 2 * second : 0;
+        out[i].values = {x[0] - .8 * x[1] + .6 * x[2] + .3 * x[3] + (first ? 1.2 : 0) - (second ? .9 : 0)};
+      }
+    };
+    const AlphaResult r = optimise(inputs, model, {}, {});
+    // at alpha = 1: x0 = .45 and x2 = .55; the first jump at 14 x1 + 6 x3 = 10.9, the second one at x3 = .21 + .6 x1
+    const LevelBounds &core = r.outputs[0].levels.back(), &support = r.outputs[0].levels.front();
+    const double close = 1e-4 * (support.upper.value - support.lower.value);
+    EXPECT_NEAR(core.upper.value, 1.7034091, close) << has_names;
+    EXPECT_NEAR(core.lower.value, -.3965909, close) << has_names;
+  }
+}
+
 // Some 400 hills whose heights differ by little, narrower than what lies between spread runs; the bounds are those of
 // a grid of 4,000 x 4,000, refined.
 TEST(AlphaPhysics, HillsNarrowerThanSpreadRunsAreFound) {
