@@ -88,7 +88,11 @@ class Optimisation {
   /// Rounds from other places, then classes, to the end.
   AlphaResult search_on(bool is_first) {
     const int limit = asker_.limit();
-    if (options_.search_classes && !make_goals(true).empty()) asker_.set_limit(limit - asker_.rest() / 7);
+    if (options_.search_classes) {
+      // as much for each bound
+      const std::size_t classes = make_goals(true).size() / std::max<std::size_t>(1, make_goals(false).size());
+      asker_.set_limit(limit - static_cast<int>(asker_.rest() * classes / (classes + 1)));
+    }
     // lines and searches along kinks at the best places that there will be
     const bool has_last_steps = has_line_searches() || !kinked_.empty();
     if (has_last_steps) asker_.set_limit(asker_.limit() - asker_.rest() / 10);
