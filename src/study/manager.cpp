@@ -289,7 +289,7 @@ class Manager {
       find_broken_limits();
       asker.set_limit(budget.possibilities - (budget.possibilities - asker.asked()) / 4);
       find_possibilities(r, asker);
-      asker.set_limit(std::max(budget.bounds, asker.asked() + (budget.possibilities - asker.asked()) / 2));
+      asker.set_limit(std::max(budget.bounds, asker.asked() + 3 * (budget.possibilities - asker.asked()) / 4));
       return r.possibilities.facets;
     };
     uncertainty::AlphaSearch search(problem_.space, asker, options);

@@ -106,7 +106,7 @@ struct AlphaOptions {
   /// Steps over the support of lines along the axes, through the middle of the inputs (twice as many) and through the
   /// best samples: a bound has converged only when none of them leads to a better one. 0: no lines.
   int lines = 12;
-  /// Own searches for the bounds of each outcome class, for which a seventh of the limit is kept; without them these
+  /// Own searches for the bounds of each outcome class, for which as many runs a bound are kept; without them these
   /// bounds are read off the archive.
   bool search_classes = true;
   /// Called once, when the bounds of all runs are searched and before those of each class where there are several:
