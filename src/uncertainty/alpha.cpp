@@ -476,6 +476,14 @@ class Optimisation {
     std::erase_if(ends_, [&](const auto& e) { return is_of(e.first); });
   }
 
+  /// Where values fall ever more steeply towards another outcome, no model search beside one tells that nothing better
+  /// is near.
+  bool is_steep(const Goal& goal) const { return steep_.contains({goal.output, goal.sign > 0}); }
+  void note_steep(const Goal& goal) {
+    if (steep_.insert({goal.output, goal.sign > 0}).second)
+      std::erase_if(ends_, [&](const auto& e) { return e.first[0] == goal.output && e.first[2] == (goal.sign > 0); });
+  }
+
   /// Whether searches for a bound ended at places of different values, or would have.
   bool has_valleys() const {
     return has_shallow_valleys_ || std::any_of(optima_.begin(), optima_.end(), [this](const auto& of) {
@@ -558,6 +566,7 @@ class Optimisation {
     o.tolerance = options_.tolerance * width_of(goal.output);
     if (seeks_edges()) o.edge = 1e-3;
     o.doubts_edges = !has_kinks(goal);
+    o.looks_steep = goal.outcome == any_class && !is_steep(goal);
     o.seed = options_.seed + ++searches_;
     const Region& region = regions_[goal.level];
     const Point& from = asker_.archive()[start.sample].x;
@@ -627,6 +636,7 @@ class Optimisation {
     }
     for (const auto& r : all) {
       const auto* model = dynamic_cast<const ModelSearch*>(r.search.get());
+      if (model && model->is_steep()) note_steep(r.goal);
       if (model && model->is_wavy()) wavy_.insert({r.goal.output, r.goal.sign > 0});
       if (r.has_stopped) {
         if (const int at = asker_.archive().find(r.search->best()); at >= 0) starts_[key_of(r.goal)].push_back(at);
@@ -660,6 +670,7 @@ class Optimisation {
       }
       if (const int at = asker_.archive().find(r.search->best()); at >= 0 && !has_many_inputs()) note_end(r.goal, at);
       if (seeks_edges() && model && model->is_at_edge() && !model->has_met_walls()) note_kinks(r.goal);
+      if (is_steep(r.goal) && (!model || model->has_met_walls())) continue;
       const bool is_open = model && has_kinks(r.goal);
       double& end = (is_open ? edges_ : ends_).try_emplace(key_of(r.goal), infinite).first->second;
       end = std::min(end, r.search->value());
@@ -1087,6 +1098,7 @@ class Optimisation {
   std::map<Key, std::vector<int>> starts_;  // samples from which searches began, or at which they stopped
   std::map<std::pair<int, bool>, std::vector<Optimum>> optima_;  // by output and sign
   std::set<std::pair<int, bool>> wavy_;                          // the same: values vary within little
+  std::set<std::pair<int, bool>> steep_;                         // the same: beside another outcome
   std::map<Key, int> idle_rounds_;                               // in a row, that gained nothing
   bool has_shallow_valleys_ = false;                             // that searches were stopped in
   std::map<Key, Faces> faces_;

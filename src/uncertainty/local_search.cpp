@@ -15,6 +15,9 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr int beyond = std::numeric_limits<int>::min();  // outcome of what lies beyond a jump
 constexpr int most_sections = 10;                        // that a jump is located by
 constexpr int most_jumps = 6;
+constexpr int most_approaches = 12;  // to another outcome, each half as far from it
+constexpr double much_steeper = 4;
+constexpr double ways_back[] = {1e-3, 1e-5};  // away from one, by widths
 constexpr double part_beyond = 0.3;  // of a jump, by which a place misses the model of this side that lies beyond
 
 }  // namespace
@@ -652,7 +655,7 @@ void ModelSearch::finish_iteration() {
                  (along_ < 0.05 && !boundary_.has_edges());
     at_edge_ = !settled || is_bent();
     pending_.clear();
-    look_for_jump((settled ? 1e5 : 100) * options_.tolerance);
+    if (!look_steep()) look_for_jump((settled ? 1e5 : 100) * options_.tolerance);
     return;
   }
   if (good && length >= 0.99 * trust_) {
@@ -666,6 +669,55 @@ void ModelSearch::finish_iteration() {
 
 double ModelSearch::calc_outlook() const {
   return iteration_ >= 2 && last_gain_ <= 0.5 * earlier_gain_ ? value_ - 3 * last_gain_ : -infinite;
+}
+
+/// Begins to look at slopes on the line to the nearest place of another outcome: first away from it, then to it.
+bool ModelSearch::look_steep() {
+  if (!options_.looks_steep || !converged_ || walls_.empty()) return false;
+  const auto nearest = std::min_element(walls_.begin(), walls_.end(), [this](const Point& a, const Point& b) {
+    return boundary_.calc_offset(a, best_) < boundary_.calc_offset(b, best_);
+  });
+  near_ = {best_, value_}, far_ = {*nearest, infinite};
+  const double distance = boundary_.calc_offset(far_.x, best_);
+  for (const double back : ways_back) {
+    Point x = best_;
+    for (const Axis& axis : axes_) x[axis.input] += back / distance * (best_[axis.input] - far_.x[axis.input]);
+    if (region_.contains(x)) pending_.push_back(std::move(x));
+  }
+  stage_ = Stage::Back;
+  if (pending_.size() < std::size(ways_back)) look_back({});
+  return true;
+}
+
+void ModelSearch::look_back(std::span<const Told> told) {
+  double slopes[2] = {0, 0};
+  for (std::size_t k = 0; k < told.size(); ++k)
+    if (told[k].outcome == outcome_) slopes[k] = (told[k].value - near_.value) / ways_back[k];
+  is_steep_ =
+      slopes[0] > 0 && slopes[1] > much_steeper * slopes[0] && slopes[1] * ways_back[1] > 100 * options_.tolerance;
+  converged_ = !is_steep_;
+  section_ = 0, first_slope_ = 0;
+  stage_ = Stage::Approach;
+  pending_.clear();
+  if (!is_steep_) pending_ = {calc_middle()};
+}
+
+void ModelSearch::approach(const Told& told) {
+  const Point x = pending_.front();
+  pending_.clear();
+  if (told.outcome == outcome_ && std::isfinite(told.value)) {
+    const double slope = (near_.value - told.value) / boundary_.calc_offset(x, near_.x);
+    if (first_slope_ == 0) first_slope_ = std::max(slope, options_.tolerance);
+    is_steep_ = slope > much_steeper * first_slope_ && near_.value - told.value > 100 * options_.tolerance;
+    near_ = {x, told.value};
+    if (told.value < value_) best_ = x, value_ = told.value;
+  } else {
+    far_.x = x;
+  }
+  if (is_steep_) converged_ = false;
+  Point middle = calc_middle();
+  if (!is_steep_ && ++section_ < most_approaches && middle != near_.x && middle != far_.x)
+    pending_ = {std::move(middle)};
 }
 
 // ---- jumps of the value
@@ -798,6 +850,14 @@ void ModelSearch::tell(std::span<const Told> given) {
     read_section(given.front());
     return;
   }
+  if (stage_ == Stage::Back) {
+    look_back(given);
+    return;
+  }
+  if (stage_ == Stage::Approach) {
+    approach(given.front());
+    return;
+  }
   const std::vector<Told> told = split_at_jump(given);
   note(told);
   switch (stage_) {
@@ -811,6 +871,8 @@ void ModelSearch::tell(std::span<const Told> given) {
       conclude_star();
       break;
     case Stage::Section:
+    case Stage::Back:
+    case Stage::Approach:
       break;
     case Stage::Probe: {
       std::vector<bool> inside;

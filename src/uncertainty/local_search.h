@@ -71,6 +71,7 @@ class ModelSearch : public LocalSearch {
     double smallest = 1e-5;     // radius at which it ends anyway
     double edge = 0;            // the same where no other outcome was met
     bool doubts_edges = false;  // a nearer star tells kinks from narrow valleys
+    bool looks_steep = false;   // looks whether values fall ever more steeply towards another outcome
     int iterations = 60;        // at most
     int probes = 8;             // of the boundary of another outcome, at most
     std::uint64_t seed = 1;     // for the subproblem under constraints
@@ -87,6 +88,9 @@ class ModelSearch : public LocalSearch {
   bool is_at_edge() const { return at_edge_; }
   /// Whether it ended where the mapping is smooth, but only within much less than its first star.
   bool is_wavy() const { return converged_ && !at_edge_ && (is_bend_checked_ || is_edge_checked_); }
+  /// Whether values fall ever more steeply towards the outcome that it ended beside, as roots do: stars tell nothing
+  /// there.
+  bool is_steep() const { return is_steep_; }
   /// What it may come to, as its gains shrink; -infinity as long as they do not.
   double calc_outlook() const;
   bool has_met_walls() const { return has_met_walls_; }
@@ -143,6 +147,9 @@ class ModelSearch : public LocalSearch {
   void find_allowed_step(std::vector<double>& step);
   bool is_beyond(const Point&, double value) const;
   std::vector<Told> split_at_jump(std::span<const Told> told) const;
+  bool look_steep();
+  void look_back(std::span<const Told> told);
+  void approach(const Told& told);
   void look_for_jump(double least);
   Point calc_middle() const;
   void read_section(const Told& told);
@@ -172,7 +179,9 @@ class ModelSearch : public LocalSearch {
   bool is_bend_checked_ = false;  // with a nearer star
   bool is_edge_checked_ = false;  // by another iteration at its radius
   double last_gain_ = 0, earlier_gain_ = 0;
-  enum class Stage { Star, Inner, Probe, Trial, Section } stage_ = Stage::Star;
+  bool is_steep_ = false;
+  double first_slope_ = 0;  // of the value, on the way to the other outcome
+  enum class Stage { Star, Inner, Probe, Trial, Section, Back, Approach } stage_ = Stage::Star;
   std::vector<Point> walls_;    // places of other outcomes, latest last
   Place inner_;                 // about which slopes are looked for that the star does not tell
   std::vector<Place> insides_;  // of the best point's outcome

@@ -456,6 +456,33 @@ TEST(AlphaPhysics, InputsThatActAloneAreExactOrMarked) {
   }
 }
 
+// The least value lies where runs begin to fail and values fall as a root does: near it is not at it.
+TEST(AlphaPhysics, BoundsBesideASteepWallAreMarked) {
+  const Evaluate model = [](std::span<const Point> points, std::span<Result> out) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double x = points[i][0], y = points[i][1], d = x * x - y + .7;
+      out[i].state = d < 0 ? Result::State::Failed : Result::State::Done;
+      if (d >= 0) out[i].values = {std::sqrt(d) - .2 * y};
+    }
+  };
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    AlphaOptions options;
+    options.seed = seed;
+    const AlphaResult r = optimise({make_triangular(0, .6, 2), make_triangular(0, 1.6, 2)}, model, options, {});
+    for (const LevelBounds& l : r.outputs[0].levels) {
+      if (l.alpha == 1) continue;  // the core fails
+      // on the wall, at the upper end of one of the inputs
+      const double right = 2 - 1.4 * l.alpha, least = -.2 * std::min(2 - .4 * l.alpha, right * right + .7);
+      const double most = std::sqrt(right * right - 1.6 * l.alpha + .7) - .32 * l.alpha;
+      EXPECT_FALSE(l.lower.converged) << "seed " << seed;
+      EXPECT_GE(l.lower.value, least - 1e-9);
+      EXPECT_LE(l.lower.value, least + .03);
+      EXPECT_TRUE(l.upper.converged) << "seed " << seed;
+      EXPECT_NEAR(l.upper.value, most, 1e-6);
+    }
+  }
+}
+
 // At alpha = 1 plateaus vary and points do not, so planes of jumps and of outcomes are found in other spaces there.
 TEST(AlphaPhysics, CoresOfBothKindsBesideJumps) {
   const std::vector<FuzzyNumber> inputs = {make_triangular(0, .45, 1), make_trapezoidal(0, .3, .7, 1),

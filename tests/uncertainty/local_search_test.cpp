@@ -222,6 +222,36 @@ TEST(ModelSearch, TellsNarrowValleysFromKinks) {
   EXPECT_GE(misled, 20) << "nothing that could mislead";
 }
 
+// Beside a wall at which values fall as a root does every place looks like an end; beside others it is one.
+TEST(ModelSearch, SeesValuesFallSteeplyTowardsAWall) {
+  const Space space = make_cube(2);
+  const auto calc_depth = [](const Point& x) { return x[0] * x[0] - x[1] + 0.7; };
+  const Model root = [&](const Point& x) {
+    const double d = calc_depth(x);
+    return d < 0 ? Told{std::numeric_limits<double>::infinity(), failed_outcome} : Told{std::sqrt(d) - 0.2 * x[1], 0};
+  };
+  const Model line = [&](const Point& x) {
+    const double d = calc_depth(x);
+    return d < 0 ? Told{std::numeric_limits<double>::infinity(), failed_outcome} : Told{d + 0.5 * x[0] * x[0], 0};
+  };
+  Random random(5);
+  ModelSearch::Options options;
+  options.looks_steep = true;
+  for (int k = 0; k < 40; ++k) {
+    Point start;
+    do { start = {random.next(-1.5, 1.5), random.next(-1.5, 1.5)}; } while (calc_depth(start) < 0);
+    ModelSearch steep(make_region(space, 0), start, root(start), options);
+    drive(steep, root);
+    EXPECT_TRUE(steep.is_steep() && !steep.is_converged())
+        << "from " << start[0] << ", " << start[1] << " to " << steep.best()[0] << ", " << steep.best()[1] << " "
+        << steep.value() << " depth " << calc_depth(steep.best()) << " conv " << steep.is_converged()
+        << steep.is_at_edge() << steep.has_met_walls();
+    ModelSearch flat(make_region(space, 0), start, line(start), options);
+    drive(flat, line);
+    EXPECT_FALSE(flat.is_steep()) << "from " << start[0] << ", " << start[1];
+  }
+}
+
 TEST(ModelSearch, ForetellsWhatItMayComeTo) {
   const Space space = make_cube(2);
   const Model model = [](const Point& x) { return Told{std::cosh(x[0] - 0.2) + std::cosh(1.5 * (x[1] + 0.1)), 0}; };
