@@ -18,8 +18,10 @@ function Page(props: { study: Study }) {
       <main class="study">
         <div class="pair">
           <Outcomes state={state} />
-          <Requirement state={state} />
-          <Inputs study={props.study} />
+          <div class="column">
+            <Requirement state={state} />
+            <Inputs study={props.study} />
+          </div>
         </div>
         <div class="pair">
           <Fans state={state} />
