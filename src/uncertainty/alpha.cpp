@@ -457,8 +457,9 @@ class Optimisation {
   /// What is an optimum of a wide cut is one of a narrow one as well, and the other way round where no end of the
   /// narrow one holds it.
   bool is_optimum_of(const Optimum& o, const Goal& goal) const {
-    if (goal.outcome != any_class || depth_[o.sample] <= goal.level) return false;
     const Region& r = regions_[o.level];
+    if (goal.outcome != any_class || depth_[o.sample] <= goal.level || r.axes != regions_[goal.level].axes)
+      return false;
     const Point& x = asker_.archive()[o.sample].x;
     return o.level <= goal.level || (!space_.has_interaction() && std::all_of(r.axes.begin(), r.axes.end(), [&](int i) {
              const double least = 1e-6 * r.scale[i];
