@@ -86,9 +86,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   ProgressLine line;
   StudyResult r;
   long answers = 0;
-  const auto remove_new = [&] {
-    return is_new && remove_unused(place, study::calc_model_hash(problem), answers);
-  };
+  const auto remove_new = [&] { return is_new && remove_unused(place, study::calc_model_hash(problem), answers); };
   const auto remove_empty_folder = [&] {
     if (is_new_folder) std::filesystem::remove(a.output, failure);  // what holds something stays
   };

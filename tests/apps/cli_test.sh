@@ -85,7 +85,7 @@ TEXT
   expect 2 "$topple" study in.toml --evaluator "$model" -o a --name ""; has err "a name is wanted"
   expect 2 "$topple" study in.toml --evaluator "$model" -o a --name x; has err "only a study on a server has a name"
   [ ! -e a ] || { echo "a folder was made for wrong arguments"; failures=$((failures + 1)); }
-  expect 1 "$topple" study in.toml --evaluator "$model" -o a --store postgresql://127.0.0.1:1/none --patience "0.1 s"; has err "the store is away"
+  expect 1 timeout --preserve-status -s INT 1 "$topple" study in.toml --evaluator "$model" -o a --store postgresql://127.0.0.1:1/none; has err "the store is away"
   [ ! -e a ] || { echo "a folder was made for a server that is away"; failures=$((failures + 1)); }
   expect 2 "$topple" study in.toml --evaluator "$model"; has err "--output"
   expect 2 "$topple" study "$plan" -o a; has err "fuzzy"
