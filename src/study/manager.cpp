@@ -415,12 +415,16 @@ class Manager {
       find_knowing(r, asker, pass);
       settle();
     }
+    // half of it for bounds within boxes, where there are boxes
+    const int for_bounds = problem_.permissible.empty() ? limit : limit - asker.rest() / 2;
     for (const int part : {10, 0, 0, 0}) {
+      asker.set_limit(for_bounds);
       if (!r.alpha.can_go_on || !asker.can_go_on()) break;
-      if (part > 0 && r.alpha.classes.size() > 1) asker.set_limit(limit - asker.rest() / part);
+      if (part > 0 && r.alpha.classes.size() > 1) asker.set_limit(for_bounds - asker.rest() / part);
       r.alpha = search.go_on();
       settle();
     }
+    asker.set_limit(limit);
   }
 
   /// What is left goes into spread points, until half of all runs are such, and into searches from what they meet: of

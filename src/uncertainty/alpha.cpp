@@ -89,9 +89,14 @@ class Optimisation {
   AlphaResult search_on(bool is_first) {
     const int limit = asker_.limit();
     if (options_.search_classes) {
-      // as much for each bound
-      const std::size_t classes = make_goals(true).size() / std::max<std::size_t>(1, make_goals(false).size());
-      asker_.set_limit(limit - static_cast<int>(asker_.rest() * classes / (classes + 1)));
+      // as much for each bound, later for each that is open
+      const std::vector<Goal> goals = make_goals(true);
+      const auto open = std::count_if(goals.begin(), goals.end(), [&](const Goal& goal) {
+        const Candidate best = find_best(goal);
+        return is_first || (best.sample >= 0 && !regions_[goal.level].axes.empty() && !is_converged(goal, best));
+      });
+      const auto all = static_cast<double>(open) + static_cast<double>(make_goals(false).size());
+      asker_.set_limit(limit - static_cast<int>(asker_.rest() * static_cast<double>(open) / std::max(all, 1.0)));
     }
     // lines and searches along kinks at the best places that there will be
     const bool has_last_steps = has_line_searches() || !kinked_.empty();
