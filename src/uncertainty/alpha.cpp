@@ -33,6 +33,9 @@ struct Goal {
   int outcome = any_class;
 };
 
+/// Output, and whether its least or its largest value is looked for.
+std::pair<int, bool> side_of(const Goal& goal) { return {goal.output, goal.sign > 0}; }
+
 struct Candidate {
   double value = infinite;
   int sample = -1;
@@ -78,13 +81,15 @@ class Optimisation {
     spread(count / count_spread());
     if (!has_many_inputs()) search_dispersed();
     recheck(false);
-    has_gained(before);
+    note_round(before);
     if (options_.search_classes) recheck(true);
     ++rounds_;
     return conclude();
   }
 
  private:
+  using Key = std::vector<int>;
+
   /// Rounds from other places, then classes, to the end.
   AlphaResult search_on(bool is_first) {
     const int limit = asker_.limit();
@@ -108,7 +113,7 @@ class Optimisation {
       for (int k = 0; k < 2; ++k) restart_faces(true);
       const bool has_starts = search_dispersed();
       recheck(false);
-      idle = has_gained(before) ? 0 : idle + 1;
+      idle = note_round(before) ? 0 : idle + 1;
       if (idle >= options_.patience && !unfinished_) is_done_ = true;
       ++rounds_;
       // no sample is left that stands out among its neighbours
@@ -318,7 +323,7 @@ class Optimisation {
       if (level != goal.level)
         if (const Candidate best = find_best({goal.output, level, goal.sign, goal.outcome}); best.sample >= 0)
           others.push_back(best.sample);
-    for (const Optimum& end : optima_[{goal.output, goal.sign > 0}]) others.push_back(end.sample);
+    for (const Optimum& end : optima_[side_of(goal)]) others.push_back(end.sample);
     const Point& x = asker_.archive()[start.sample].x;
     for (const int i : r.axes) {
       std::vector<double> places;
@@ -400,7 +405,7 @@ class Optimisation {
     for (const Candidate& c : all) add_place(places.at, c.sample);
     std::vector<double> taken;
     for (const int sample : starts_[key_of(goal)]) add_place(taken, sample);
-    for (const Optimum& o : optima_[{goal.output, goal.sign > 0}])
+    for (const Optimum& o : optima_[side_of(goal)])
       if (is_optimum_of(o, goal)) add_place(taken, o.sample);
     std::vector<Candidate> starts;
     for (const bool only_bottoms : {true, false}) {
@@ -424,8 +429,8 @@ class Optimisation {
     for (const Goal& goal : make_goals(false)) values.push_back(find_best(goal).value);
     return values;
   }
-  /// Whether a round gained anything; counts the rounds in a row in which a goal did not.
-  bool has_gained(const std::vector<double>& before) {
+  /// Counts for each goal the rounds in a row that gained nothing; whether this one gained anything.
+  bool note_round(const std::vector<double>& before) {
     const std::vector<Goal> goals = make_goals(false);
     const std::vector<double> now = calc_bounds();
     if (now.size() != before.size()) return true;
@@ -453,7 +458,7 @@ class Optimisation {
   /// A local optimum: other starts keep a distance from it, and it is tried in the other cuts.
   void note_end(const Goal& goal, int sample) {
     if (goal.outcome != any_class) return;
-    std::vector<Optimum>& all = optima_[{goal.output, goal.sign > 0}];
+    std::vector<Optimum>& all = optima_[side_of(goal)];
     if (std::none_of(all.begin(), all.end(),
                      [&](const Optimum& o) { return o.sample == sample && o.level == goal.level; }))
       all.push_back({sample, goal.level});
@@ -473,21 +478,19 @@ class Optimisation {
   }
 
   /// Where an output has kinks that bound it on this side, no model search tells that nothing better is near.
-  bool has_kinks(const Goal& goal) const { return kinked_.contains({goal.output, goal.sign > 0}); }
+  bool has_kinks(const Goal& goal) const { return kinked_.contains(side_of(goal)); }
   void note_kinks(const Goal& goal) {
-    if (!kinked_.insert({goal.output, goal.sign > 0}).second) return;
-    const auto is_of = [&goal](const Key& key) { return key[0] == goal.output && key[2] == (goal.sign > 0); };
+    if (!kinked_.insert(side_of(goal)).second) return;
     for (const auto& [key, end] : ends_)
-      if (is_of(key)) edges_.try_emplace(key, infinite).first->second = end;
-    std::erase_if(ends_, [&](const auto& e) { return is_of(e.first); });
+      if (is_of_side(key, goal)) edges_.try_emplace(key, infinite).first->second = end;
+    forget_ends(goal);
   }
 
   /// Where values fall ever more steeply towards another outcome, no model search beside one tells that nothing better
   /// is near.
-  bool is_steep(const Goal& goal) const { return steep_.contains({goal.output, goal.sign > 0}); }
+  bool is_steep(const Goal& goal) const { return steep_.contains(side_of(goal)); }
   void note_steep(const Goal& goal) {
-    if (steep_.insert({goal.output, goal.sign > 0}).second)
-      std::erase_if(ends_, [&](const auto& e) { return e.first[0] == goal.output && e.first[2] == (goal.sign > 0); });
+    if (steep_.insert(side_of(goal)).second) forget_ends(goal);
   }
 
   /// Whether searches for a bound ended at places of different values, or would have.
@@ -551,7 +554,7 @@ class Optimisation {
   bool is_vain(const Running& r) {
     const Point& x = r.search->best();
     const Region& region = regions_[r.goal.level];
-    for (const Optimum& o : optima_[{r.goal.output, r.goal.sign > 0}]) {
+    for (const Optimum& o : optima_[side_of(r.goal)]) {
       if (!is_optimum_of(o, r.goal) || value_of(r.goal, o.sample) > r.search->value()) continue;
       const Point& y = asker_.archive()[o.sample].x;
       if (x != y && std::all_of(region.axes.begin(), region.axes.end(), [&](int i) {
@@ -559,8 +562,9 @@ class Optimisation {
           }))
         return true;
     }
-    const bool is_shallow = static_cast<const ModelSearch&>(*r.search).calc_outlook() >
-                            find_best(r.goal).value + 1e-3 * width_of(r.goal.output);
+    const double outlook = static_cast<const ModelSearch&>(*r.search).calc_outlook();
+    const bool is_shallow =
+        std::isfinite(outlook) && outlook > find_best(r.goal).value + 1e-3 * width_of(r.goal.output);
     has_shallow_valleys_ = has_shallow_valleys_ || is_shallow;
     return is_shallow;
   }
@@ -643,7 +647,7 @@ class Optimisation {
     for (const auto& r : all) {
       const auto* model = dynamic_cast<const ModelSearch*>(r.search.get());
       if (model && model->is_steep()) note_steep(r.goal);
-      if (model && model->is_wavy()) wavy_.insert({r.goal.output, r.goal.sign > 0});
+      if (model && model->is_wavy()) wavy_.insert(side_of(r.goal));
       if (r.has_stopped) {
         if (const int at = asker_.archive().find(r.search->best()); at >= 0) starts_[key_of(r.goal)].push_back(at);
         continue;
@@ -748,8 +752,12 @@ class Optimisation {
     if (!points.empty()) ask(points);
   }
 
-  using Key = std::vector<int>;
   static Key key_of(const Goal& g) { return {g.output, g.level, g.sign > 0, g.outcome}; }
+  static bool is_of_side(const Key& key, const Goal& g) { return key[0] == g.output && key[2] == (g.sign > 0); }
+  /// Of all levels and outcomes.
+  void forget_ends(const Goal& goal) {
+    std::erase_if(ends_, [&goal](const auto& e) { return is_of_side(e.first, goal); });
+  }
 
   /// Whether a value is noted for this goal that is as good as the best one.
   bool is_noted(const std::map<Key, double>& values, const Goal& goal, const Candidate& best) const {
@@ -767,7 +775,7 @@ class Optimisation {
 
   /// Where values vary within much less than what lies between spread runs, rounds must have gained nothing.
   bool is_explored(const Goal& goal) const {
-    if (goal.outcome != any_class || has_kinks(goal) || !wavy_.contains({goal.output, goal.sign > 0})) return true;
+    if (goal.outcome != any_class || has_kinks(goal) || !wavy_.contains(side_of(goal))) return true;
     const auto idle = idle_rounds_.find(key_of(goal));
     return idle != idle_rounds_.end() && idle->second >= options_.patience;
   }
@@ -1009,13 +1017,13 @@ class Optimisation {
         for (int k = 0; k < options_.evolutions; ++k) all.push_back({goal, make_evolution(goal, best)});
     }
     std::vector<std::pair<Goal, std::size_t>> known;  // optima before
-    for (const Goal& goal : make_goals(false)) known.push_back({goal, optima_[{goal.output, goal.sign > 0}].size()});
+    for (const Goal& goal : make_goals(false)) known.push_back({goal, optima_[side_of(goal)].size()});
     advance(all);
     // an end at a kink that is nearly as good as the best one may be a better valley
     for (const auto& [goal, count] : known) {
       if (!has_kinks(goal)) continue;
       const Candidate best = find_best(goal);
-      const std::vector<Optimum>& ends = optima_[{goal.output, goal.sign > 0}];
+      const std::vector<Optimum>& ends = optima_[side_of(goal)];
       for (std::size_t k = count; k < ends.size(); ++k)
         if (const double v = value_of(goal, ends[k].sample); ends[k].level == goal.level &&
                                                              ends[k].sample != best.sample &&

@@ -699,7 +699,7 @@ void ModelSearch::look_back(std::span<const Told> told) {
   section_ = 0, first_slope_ = 0;
   stage_ = Stage::Approach;
   pending_.clear();
-  if (!is_steep_) pending_ = {calc_middle()};
+  if (!is_steep_) ask_middle();
 }
 
 void ModelSearch::approach(const Told& told) {
@@ -715,9 +715,7 @@ void ModelSearch::approach(const Told& told) {
     far_.x = x;
   }
   if (is_steep_) converged_ = false;
-  Point middle = calc_middle();
-  if (!is_steep_ && ++section_ < most_approaches && middle != near_.x && middle != far_.x)
-    pending_ = {std::move(middle)};
+  if (!is_steep_ && ++section_ < most_approaches) ask_middle();
 }
 
 // ---- jumps of the value
@@ -755,15 +753,15 @@ void ModelSearch::look_for_jump(double least) {
   if (worst == nullptr || worst->value - value_ < least) return;
   near_ = {best_, value_}, far_ = *worst;
   rise_ = far_.value - near_.value, section_ = 0;
-  pending_ = {calc_middle()};
   stage_ = Stage::Section;
+  ask_middle();
 }
 
-/// Of the way on which a jump is looked for.
-Point ModelSearch::calc_middle() const {
+/// Of the way between two places of different outcomes or values, unless they are next to each other.
+void ModelSearch::ask_middle() {
   Point x = near_.x;
   for (const Axis& axis : axes_) x[axis.input] += 0.5 * (far_.x[axis.input] - x[axis.input]);
-  return x;
+  if (x != near_.x && x != far_.x) pending_ = {std::move(x)};
 }
 
 /// A jump stays as high, however near its places are; a slope does not.
@@ -779,8 +777,7 @@ void ModelSearch::read_section(const Told& told) {
     stay_before_jump();
     return;
   }
-  Point middle = calc_middle();
-  if (middle != near_.x && middle != far_.x) pending_ = {std::move(middle)};
+  ask_middle();
 }
 
 /// From now on what lies beyond counts as another outcome.

@@ -151,7 +151,7 @@ class ModelSearch : public LocalSearch {
   void look_back(std::span<const Told> told);
   void approach(const Told& told);
   void look_for_jump(double least);
-  Point calc_middle() const;
+  void ask_middle();
   void read_section(const Told& told);
   void stay_before_jump();
   bool widen_star();
