@@ -65,6 +65,7 @@ void find_requirement(StudyResult& r, const Problem& p, uncertainty::Asker& aske
   o.seed = p.seed;
   o.known = r.requirement;
   o.skipped = {failed_outcome};
+  if (!r.insights.has_boxes) o.islands = 0;  // they take runs of the boxes
   r.requirement = uncertainty::find_possibilities(p.space, asker, o).classes;
 }
 

@@ -11,6 +11,7 @@
 #include "uncertainty/facets.h"
 #include "uncertainty/linear.h"
 #include "uncertainty/random.h"
+#include "uncertainty/starts.h"
 #include "uncertainty/wall.h"
 
 namespace topple::uncertainty {
@@ -88,16 +89,18 @@ class Climb {
   bool is_done() const { return stage_ == Stage::Done; }
   const std::vector<Boundary::Plane>& facets() const { return facets_; }
   Possibility result(const Archive& archive) const {
-    return {outcome_,  best_, std::min(resolution_, 1 - best_), sample_, count_above(space_, archive, best_),
-            converged_};
+    const Summit s = find_highest();
+    return {outcome_,   s.mu,     std::min(s.resolution, 1 - s.mu), s.sample, count_above(space_, archive, s.mu),
+            converged_, summits_, static_cast<int>(archive.size())};
   }
-  /// Whether nothing better than what is known has turned up: then there is nothing left to do.
-  bool take_known(const Archive& archive, const Possibility& known) {
+  /// Where nothing better than what is known has turned up, new islands are all there is to do.
+  void take_known(const Archive& archive, const Possibility& known) {
     refresh(archive);
-    if (!known.converged || best_ > known.possibility + options_.tolerance) return false;
-    resolution_ = known.resolution, converged_ = true;
-    stage_ = Stage::Done;
-    return true;
+    summits_ = known.summits;
+    if (!known.converged || best_ > known.possibility + options_.tolerance) return;
+    resolution_ = known.resolution, converged_ = best_ >= 1;
+    const bool is_done = converged_ || static_cast<std::size_t>(known.seen) == archive.size();
+    converged_ = is_done, stage_ = is_done ? Stage::Done : Stage::Ways;
   }
 
   /// Where planes bound the class, these, and from them its most possible place; false where it bends.
@@ -126,6 +129,7 @@ class Climb {
       const Point& x = archive[seen_].x;
       if (support_.contains(x)) {
         const double mu = calc_membership(space_, x);
+        if (highest_ && mu <= highest_->mu && std::find(asked_.begin(), asked_.end(), x) == asked_.end()) continue;
         // on a plateau of a joint membership the one from which the way up may be short
         const bool is_nearer = cut_ && sample_ >= 0 && mu == best_ && calc_distance(x) < calc_distance(best_x_);
         if (mu > best_ || sample_ < 0 || is_nearer) best_ = mu, sample_ = seen_, best_x_ = x;
@@ -137,7 +141,9 @@ class Climb {
   }
 
   /// Points to be run for the next step; none if there is nothing left to do.
-  std::vector<Point> ask(const Archive& archive) {
+  ///   rest  runs that are left for all classes
+  std::vector<Point> ask(const Archive& archive, int rest) {
+    rest_ = rest;
     refresh(archive);
     for (;;) {
       std::vector<Point> points;
@@ -160,9 +166,13 @@ class Climb {
         case Stage::Move:
           points = ask_moved(archive);
           break;
+        case Stage::Ways:
+          points = ask_ways(archive);
+          break;
         case Stage::Done:
           return {};
       }
+      if (highest_) asked_ = points;
       if (!points.empty()) return points;
     }
   }
@@ -195,8 +205,14 @@ class Climb {
         }
         break;
       case Stage::Move:
-        stage_ = best_ > before || (sample_ >= 0 && !had_sample) ? Stage::Start : Stage::Done;
-        converged_ = stage_ == Stage::Done && sample_ >= 0;
+        stage_ = best_ > before || (sample_ >= 0 && !had_sample) ? Stage::Start : Stage::Ways;
+        break;
+      case Stage::Ways:
+        if (best_ > before) {
+          stage_ = Stage::Start, are_bottoms_found_ = false;
+        } else {
+          leave_connected(archive);
+        }
         break;
       case Stage::Start:
       case Stage::Done:
@@ -205,7 +221,14 @@ class Climb {
   }
 
  private:
-  enum class Stage { Start, Bisect, Wall, Lead, Look, Move, Done };
+  enum class Stage { Start, Bisect, Wall, Lead, Look, Move, Ways, Done };
+  /// The most possible place of an island of the class.
+  struct Summit {
+    double mu = 0;
+    int sample = -1;
+    Point x;
+    double resolution = 1;
+  };
 
   bool is_ours(const Archive& archive, const Point& x) const {
     const int i = archive.find(x);
@@ -214,6 +237,7 @@ class Climb {
 
   void begin() {
     if (best_ >= 1 || axes_.empty() || round_++ >= options_.rounds) {
+      settle_on(find_highest());
       converged_ = best_ >= 1;
       stage_ = Stage::Done;
       return;
@@ -254,10 +278,14 @@ class Climb {
 
   void leave_bisection() {
     resolution_ = bracket_.in - bracket_.out;
-    stage_ = axes_.size() < 2 || sample_ < 0 || walled_ == best_ ? Stage::Look : Stage::Wall;
+    if (axes_.size() < 2 || sample_ < 0 || walled_ == best_) {
+      look_around();
+      return;
+    }
+    stage_ = Stage::Wall;
     reach_ = largest_reach / 2, promised_ = 1, leads_ = 0, walled_from_ = best_;
     wall_.reset(), boundary_.clear(), tried_.clear(), turns_ = 0;
-    if (stage_ == Stage::Wall && !facets_.empty()) boundary_.adopt(facets_, best_x_, reach_, {});
+    if (!facets_.empty()) boundary_.adopt(facets_, best_x_, reach_, {});
   }
 
   Boundary::Places find_places(const Archive& archive, bool ours) const {
@@ -297,10 +325,13 @@ class Climb {
     if (!wall_) {
       const auto [nearest, is_explained] = find_beyond(archive);
       const bool promises_nothing = reach_ < 0.004 && promised_ < 0.1 * options_.tolerance;
-      if (nearest < 0 || promises_nothing || (is_explained && is_bounded_) || reach_ < smallest_reach ||
+      const bool is_given_up = is_hopeless(archive);
+      if (nearest < 0 || promises_nothing || is_given_up || (is_explained && is_bounded_) || reach_ < smallest_reach ||
           leads_++ >= most_leads) {
-        stage_ = best_ > walled_from_ + options_.tolerance ? Stage::Start : Stage::Look;
+        const bool is_higher = best_ > walled_from_ + options_.tolerance;
         walled_ = best_;
+        stage_ = Stage::Start;
+        if (!is_higher || is_given_up) look_around();
         return {};
       }
       tried_.push_back(nearest);
@@ -452,8 +483,145 @@ class Climb {
       for (int i = 0; i < n; ++i) fractions[axes_[i]] = u[i];
       add(points, place_in(box, fractions));
     }
-    if (points.empty()) converged_ = sample_ >= 0, stage_ = Stage::Done;
+    if (points.empty()) stage_ = Stage::Ways;
     return points;
+  }
+
+  Summit find_highest() const {
+    return highest_ && highest_->mu >= best_ ? *highest_ : Summit{best_, sample_, best_x_, resolution_};
+  }
+  void settle_on(Summit s) { best_ = s.mu, sample_ = s.sample, best_x_ = std::move(s.x), resolution_ = s.resolution; }
+
+  /// Whether the climb of an island is not worth its runs: it has arrived at what is known, or what is missing is more
+  /// than came of those it had.
+  bool is_hopeless(const Archive& archive) const {
+    if (!highest_ || best_ > highest_->mu) return false;
+    const int n = static_cast<int>(axes_.size()), spent = seen_ - island_.seen;
+    return spent > runs_of_climb * n || (spent > 25 * n && best_ + 5 * (best_ - island_.mu) < highest_->mu) ||
+           is_known(archive, best_x_, highest_->x);
+  }
+  bool is_known(const Archive& archive, const Point& x, const Point& highest) const {
+    const auto is_near = [&](const Point& y) { return boundary_.calc_offset(x, y) < least_apart; };
+    return is_near(highest) ||
+           std::any_of(summits_.begin(), summits_.end(), [&](int at) { return is_near(archive[at].x); });
+  }
+  /// Climbs that led to the best place: the class is bent and not in pieces.
+  auto count_vain(const Archive& archive) const {
+    return std::count_if(summits_.begin(), summits_.end(),
+                         [&](int at) { return boundary_.calc_offset(archive[at].x, best_x_) < least_apart; });
+  }
+
+  static constexpr int parts_of_way = 8;
+  Point calc_on_way(const Point& from, const Point& to, int part) const {
+    Point x = from;
+    for (const int i : axes_) x[i] += (to[i] - from[i]) * part / parts_of_way;
+    return x;
+  }
+  /// To where ways are looked at: the best place, then the summits of other islands.
+  const Point& find_target(const Archive& archive) const {
+    return target_ == 0 ? best_x_ : archive[summits_[target_ - 1]].x;
+  }
+
+  /// Straight ways from runs that have no more possible one of the class around them. Membership falls nowhere below
+  /// that of their lower end, so where a way lies in the class, its run is on the island of what it leads to.
+  std::vector<Point> ask_ways(const Archive& archive) {
+    if (!are_bottoms_found_) find_bottoms(archive);
+    while (!islands_.empty() && target_ <= summits_.size()) {
+      std::vector<Point> points;
+      for (const int at : islands_)
+        for (int part = 1; part < parts_of_way; ++part)
+          add(points, calc_on_way(archive[at].x, find_target(archive), part));
+      if (!points.empty()) return points;
+      leave_connected(archive);
+    }
+    const bool is_dear = rest_ < runs_of_ways + runs_of_climb * static_cast<int>(axes_.size());
+    if (islands_.empty() || climbed_ >= options_.islands || is_dear || count_vain(archive) >= most_vain) {
+      converged_ = sample_ >= 0, stage_ = Stage::Done;
+    } else {
+      highest_ = find_highest();
+      const int at = islands_.front();
+      islands_.erase(islands_.begin());
+      settle_on({calc_membership(space_, archive[at].x), at, archive[at].x, 1});
+      island_ = {best_, seen_};
+      ++climbed_;
+      stage_ = Stage::Start;
+    }
+    return {};
+  }
+
+  void find_bottoms(const Archive& archive) {
+    are_bottoms_found_ = true, islands_.clear(), target_ = 0;
+    if (sample_ < 0 || options_.islands == 0 || is_bounded_ || axes_.size() < 2 || rest_ < runs_of_ways) return;
+    if (count_vain(archive) >= most_vain) return;
+    std::vector<std::pair<double, int>> ours;
+    for (int i = 0; i < seen_; ++i)
+      if (ours_[i] && support_.contains(archive[i].x)) ours.emplace_back(-calc_membership(space_, archive[i].x), i);
+    std::stable_sort(ours.begin(), ours.end());
+    if (constexpr std::size_t most = 2000; ours.size() > most) {
+      for (std::size_t k = 0; k < most; ++k) ours[k] = ours[k * ours.size() / most];
+      ours.resize(most);
+    }
+    RankedPlaces places{axes_.size(), {}};
+    std::vector<double> taken, others;
+    const auto append = [&](std::vector<double>& to, const Point& x) {
+      for (const int i : axes_) to.push_back(x[i] / scale_[i]);
+    };
+    for (const auto& [mu, at] : ours) append(places.at, archive[at].x);
+    for (int i = 0; i < seen_; ++i)
+      if (!ours_[i] && support_.contains(archive[i].x)) append(others, archive[i].x);
+    append(taken, best_x_);
+    for (const int at : summits_) append(taken, archive[at].x);
+    for (const std::size_t k : choose_apart(places, taken, least_apart, most_ways,
+                                            [&](std::size_t at) { return !is_linked(places, at, others); }))
+      islands_.push_back(ours[k].second);
+  }
+
+  /// Whether one of the nearest better places is a neighbour: no run of another class lies in the ball between them.
+  static bool is_linked(const RankedPlaces& places, std::size_t k, const std::vector<double>& others) {
+    const std::size_t n = places.n;
+    const auto calc_square = [n](const double* a, const double* b) {
+      double square = 0;
+      for (std::size_t i = 0; i < n; ++i) square += (a[i] - b[i]) * (a[i] - b[i]);
+      return square;
+    };
+    const double* here = &places.at[k * n];
+    std::vector<std::pair<double, std::size_t>> better;
+    for (std::size_t j = 0; j < k; ++j) better.emplace_back(calc_square(&places.at[j * n], here), j);
+    const std::size_t count = std::min(most_links, better.size());
+    std::partial_sort(better.begin(), better.begin() + static_cast<std::ptrdiff_t>(count), better.end());
+    for (std::size_t l = 0; l < count; ++l) {
+      const double* there = &places.at[better[l].second * n];
+      bool is_between = false;
+      for (std::size_t o = 0; o + n <= others.size() && !is_between; o += n)
+        is_between = calc_square(&others[o], here) + calc_square(&others[o], there) < better[l].first;
+      if (!is_between) return true;
+    }
+    return false;
+  }
+
+  /// Keeps those from which the way to the target leaves the class; then comes the next target.
+  void leave_connected(const Archive& archive) {
+    const Point& to = find_target(archive);
+    std::erase_if(islands_, [&](int at) {
+      for (int part = 1; part < parts_of_way; ++part)
+        if (const int i = archive.find(calc_on_way(archive[at].x, to, part)); i >= 0 && !ours_[i]) return false;
+      return true;
+    });
+    ++target_;
+  }
+
+  /// Behind a climb: of an island that stays below what is known come other ones.
+  void look_around() {
+    stage_ = Stage::Look;
+    if (!highest_) return;
+    if (best_ > highest_->mu) {
+      are_bottoms_found_ = false;
+    } else {
+      summits_.push_back(sample_);
+      settle_on(*highest_);
+      stage_ = Stage::Ways;
+    }
+    highest_.reset();
   }
 
   /// From the centre, by widths.
@@ -494,6 +662,23 @@ class Climb {
   double reach_ = 0, promised_ = 0;
   double walled_ = -1, walled_from_ = 0;  // possibility at which walls have led no further; at which they began
   int leads_ = 0, turns_ = 0;             // turns: leads in a row that met another plane
+  // other islands of the class: what is known while one is climbed, what was asked for last, where it began
+  std::optional<Summit> highest_;
+  std::vector<Point> asked_;
+  struct {
+    double mu = 0;
+    int seen = 0;
+  } island_;
+  std::vector<int> islands_, summits_;  // samples: where climbs may begin, where they ended
+  std::size_t target_ = 0;
+  int climbed_ = 0, rest_ = 0;
+  bool are_bottoms_found_ = false;
+  static constexpr double least_apart = 0.02;  // of where ways begin, by widths
+  static constexpr std::size_t most_links = 5;
+  static constexpr int most_vain = 2;
+  static constexpr std::size_t most_ways = 12;
+  static constexpr int runs_of_ways = 2 * most_ways * (parts_of_way - 1);  // for which there is to be room
+  static constexpr int runs_of_climb = 100;                                // of an island, per input, at most
 };
 
 }  // namespace
@@ -522,7 +707,7 @@ PossibilityResult find_possibilities(const Space& space, Asker& asker, const Pos
     std::vector<Point> points;
     std::vector<Climb*> asking;
     for (auto& [c, climb] : climbs) {
-      const auto more = climb.ask(asker.archive());
+      const auto more = climb.ask(asker.archive(), asker.rest());
       if (more.empty()) continue;
       asking.push_back(&climb);
       points.insert(points.end(), more.begin(), more.end());
@@ -570,7 +755,8 @@ std::vector<Possibility> read_possibilities(const Space& space, const Archive& a
     Possibility& seen = all.emplace_back(read_possibility(space, archive, c, classify));
     for (const Possibility& k : known)
       if (k.outcome == c && seen.possibility <= k.possibility + PossibilityOptions{}.tolerance)
-        seen.resolution = k.resolution, seen.converged = k.converged || seen.converged;
+        seen.resolution = k.resolution, seen.converged = k.converged || seen.converged, seen.summits = k.summits,
+        seen.seen = k.seen;
   }
   return all;
 }

@@ -22,6 +22,8 @@ struct Possibility {
   /// A search ended there because it saw nothing higher. Never where no run of the class was found from which one could
   /// begin.
   bool converged = false;
+  std::vector<int> summits = {};  // runs with the largest μ on other islands of the class, as far as climbed
+  int seen = 0;                   // runs that were there when the search ended
 };
 
 struct PossibilityOptions {
@@ -29,7 +31,9 @@ struct PossibilityOptions {
   int rounds = 30;          // of bisecting, sliding and looking around, per class at most
   std::uint64_t seed = 1;
   int spread = 40;  // points per input above what was found, at last
-  /// Found before: a class that has converged and of which no run is more possible by now is not searched again.
+  int islands = 4;  // of the class, at most, that no straight way in it leads to, are climbed too
+  /// Found before: of a class that has converged and of which no run is more possible by now only islands are climbed
+  /// that have turned up since.
   std::vector<Possibility> known = {};
   Classify classify = outcome_of;
   std::vector<int> skipped = {};  // classes that another search looks for
@@ -43,8 +47,8 @@ struct PossibilityResult {
 };
 
 /// Starts from the archive's best samples of each class: bisects towards the core, slides along the boundary of the
-/// class, looks around above what was found, moves the class's other runs there, until nothing higher is seen. Needs an
-/// archive that holds points (`optimise`).
+/// class, looks around above what was found, moves the class's other runs there, until nothing higher is seen; then
+/// from runs of the class in other islands of it. Needs an archive that holds points (`optimise`).
 PossibilityResult find_possibilities(const Space&, Asker&, const PossibilityOptions&);
 
 /// What the runs of one class show, without a search: its best one, those above it; towards the core nothing is known.

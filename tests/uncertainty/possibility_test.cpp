@@ -169,6 +169,37 @@ TEST(PossibilityPhysics, OfTheHighestOfManyIslands) {
   }
 }
 
+// Thin plates that lean, most possible where x1 = .45: a run of one leaves it when it is pulled towards the middle of
+// the inputs, as those of the half space beside it do not, which is less possible.
+TEST(PossibilityPhysics, OfAThinIslandBesideALargeOne) {
+  const Space space{std::vector<FuzzyNumber>(3, make_triangular(-1, 0, 1)), {}, {}};
+  const struct {
+    Point slope;
+    double middle;
+    Point known;
+  } all[] = {{{1, 1, -.3}, .9, {.95, .02, .23}}, {{1, 1, 1}, 1, {.95, -.3, .35}}};
+  for (const auto& plate : all) {
+    const Evaluate model = make_classes([&plate](const Point& x) {
+      const double along = std::inner_product(x.begin(), x.end(), plate.slope.begin(), -plate.middle);
+      return x[0] < -.5 || (x[0] > .45 && std::abs(along) < .02) ? 1 : 0;
+    });
+    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+      const Progress progress;
+      Asker asker(model, progress, nullptr, 5000);
+      asker.ask({calc_centre(space), {-.9, .3, .2}, plate.known});
+      PossibilityOptions o;
+      o.seed = seed;
+      const PossibilityResult r = find_possibilities(space, asker, o);
+      ASSERT_EQ(r.classes.size(), 2u);
+      const Possibility& p = r.classes[1];
+      EXPECT_NEAR(p.possibility, .55, 1e-3) << "seed " << seed;
+      EXPECT_TRUE(p.converged);
+      ASSERT_FALSE(p.summits.empty());
+      for (const int at : p.summits) EXPECT_NEAR(asker.archive()[at].x[0], -.5, 1e-3) << "the half space's";
+    }
+  }
+}
+
 // Wedges and corners of two and three half spaces; linear programmes give the level at which the cut touches them.
 TEST(PossibilityPhysics, OfAWedgeOfHalfSpaces) {
   struct Case {
