@@ -98,9 +98,9 @@ class Climb {
     refresh(archive);
     summits_ = known.summits;
     if (!known.converged || best_ > known.possibility + options_.tolerance) return;
-    resolution_ = known.resolution, converged_ = best_ >= 1;
-    const bool is_done = converged_ || static_cast<std::size_t>(known.seen) == archive.size();
-    converged_ = is_done, stage_ = is_done ? Stage::Done : Stage::Ways;
+    resolution_ = known.resolution;
+    converged_ = best_ >= 1 || static_cast<std::size_t>(known.seen) == archive.size();
+    stage_ = converged_ ? Stage::Done : Stage::Ways;
   }
 
   /// Where planes bound the class, these, and from them its most possible place; false where it bends.
@@ -498,17 +498,13 @@ class Climb {
     if (!highest_ || best_ > highest_->mu) return false;
     const int n = static_cast<int>(axes_.size()), spent = seen_ - island_.seen;
     return spent > runs_of_climb * n || (spent > 25 * n && best_ + 5 * (best_ - island_.mu) < highest_->mu) ||
-           is_known(archive, best_x_, highest_->x);
+           is_near(best_x_, highest_->x) ||
+           std::any_of(summits_.begin(), summits_.end(), [&](int at) { return is_near(best_x_, archive[at].x); });
   }
-  bool is_known(const Archive& archive, const Point& x, const Point& highest) const {
-    const auto is_near = [&](const Point& y) { return boundary_.calc_offset(x, y) < least_apart; };
-    return is_near(highest) ||
-           std::any_of(summits_.begin(), summits_.end(), [&](int at) { return is_near(archive[at].x); });
-  }
+  bool is_near(const Point& x, const Point& y) const { return boundary_.calc_offset(x, y) < least_apart; }
   /// Climbs that led to the best place: the class is bent and not in pieces.
   auto count_vain(const Archive& archive) const {
-    return std::count_if(summits_.begin(), summits_.end(),
-                         [&](int at) { return boundary_.calc_offset(archive[at].x, best_x_) < least_apart; });
+    return std::count_if(summits_.begin(), summits_.end(), [&](int at) { return is_near(archive[at].x, best_x_); });
   }
 
   static constexpr int parts_of_way = 8;
@@ -549,6 +545,7 @@ class Climb {
     return {};
   }
 
+  /// Runs from which climbs may begin.
   void find_bottoms(const Archive& archive) {
     are_bottoms_found_ = true, islands_.clear(), target_ = 0;
     if (sample_ < 0 || options_.islands == 0 || is_bounded_ || axes_.size() < 2 || rest_ < runs_of_ways) return;
