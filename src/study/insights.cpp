@@ -15,6 +15,8 @@ using json = nlohmann::ordered_json;
 constexpr int least_rows = 32, most_rows = 256;
 constexpr std::size_t least_spread = 10;
 constexpr int least_knowing = 20, most_knowing = 250;  // runs per input
+constexpr int least_with_bounds = 600;  // runs for boxes: of fewer, bounds in them are of a handful of points
+constexpr int least_in_boxes = 50;      // runs per input
 
 int count_axes(const uncertainty::Space& space) {
   int n = 0;
@@ -74,6 +76,8 @@ Budget calc_budget(const Problem& p, int limit) {
   }
   b.outcomes = rest;
   b.requirement = (limit - rest) / 4;
+  const int in_boxes = (limit - rest) / 6;
+  if (limit - rest >= least_with_bounds && in_boxes >= least_in_boxes * axes) b.in_boxes = in_boxes;
   // possibilities take what they need of that, but for a half
   b.possibilities = rest - b.knowing * axes / 2;
   b.bounds = rest - b.knowing * axes - rest / 10;
@@ -168,12 +172,11 @@ void find_boxes(Insights& out, const Problem& p, const Budget& b, uncertainty::A
                            [](const auto& s) { return s.result.state == uncertainty::Result::State::Done; }))
     return;
   const uncertainty::Requirement requirement = make_requirement(read_permissible(p.permissible, p), outputs, outcomes);
-  const int runs = b.limit - b.outcomes, axes = std::max(1, count_axes(p.space));
+  const int runs = b.limit - b.outcomes - b.in_boxes, axes = std::max(1, count_axes(p.space));
   uncertainty::DesignOptions o;
   o.space_points = std::min(200 * axes, std::max(1, runs / 4));
-  o.fresh = std::clamp(runs / 12, 20, 149);
-  constexpr int least_rerun = 50;  // below, bounds would be those of a handful of points
-  o.rerun_limit = runs / 12 < least_rerun ? 0 : std::min(2000, runs / 12);
+  o.fresh = std::clamp((runs + b.in_boxes) / 12, 20, 149);
+  o.rerun_limit = runs + b.in_boxes < least_with_bounds ? 0 : std::min(2000, runs / 12);
   // a box that nothing is left to check is of no use
   o.k_max = std::clamp(runs / (o.fresh + o.rerun_limit + 50 * axes), 2, 6);
   o.levels = levels;

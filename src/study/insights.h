@@ -22,7 +22,8 @@ struct Budget {
   int possibilities = 0;  // that of possibilities
   int of_limit = 0;       // for how possible it is that a limit of the plan is broken: of each that some run breaks
   int outcomes = 0;       // that of outcomes with an input known; the rest is for boxes,
-  int requirement = 0;    // but for so many to tell how possible it is that their requirement is broken
+  int requirement = 0;    // but for so many to tell how possible it is that their requirement is broken,
+  int in_boxes = 0;       // and so many for bounds of outputs in them, behind their search (0: too few for it)
 };
 Budget calc_budget(const Problem&, int limit);
 

@@ -311,13 +311,19 @@ class Manager {
       const int before = asker.asked();
       asker.set_limit(before + budget.requirement);
       find_requirement(r, problem_, asker, names_.outputs, names_.outcomes);
-      asker.set_limit(budget.limit - (asker.asked() - before));
+      asker.set_limit(budget.limit - budget.in_boxes - (asker.asked() - before));
       find_boxes(r.insights, problem_, budget, asker, options.levels, names_.outputs, names_.outcomes);
     }
-    asker.set_limit(budget.limit);
+    const bool has_boxes = r.insights.has_boxes;
+    asker.set_limit(budget.limit - (has_boxes ? budget.in_boxes : 0));
     give_back(r, asker, search);
+    asker.set_limit(budget.limit);
     if (problem_.permissible.empty()) look_further(r, asker, search);
     finish_boxes(r.insights, problem_, asker, options.levels, names_.outputs, names_.outcomes);
+    if (has_boxes && asker.can_go_on()) {
+      give_back(r, asker, search);
+      finish_boxes(r.insights, problem_, asker, options.levels, names_.outputs, names_.outcomes);
+    }
     if (asker.asked() > asked_by_bounds || has_classes()) {
       // further runs may have moved bounds
       std::vector<int> space_points;

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <utility>
 
 #include "uncertainty/facets.h"
 #include "uncertainty/kink_search.h"
@@ -61,8 +62,9 @@ class Optimisation {
     check_faces(false);
     if (has_line_searches() && has_room_for_lines()) search_lines(false);
     search_from_best(false);
+    if (options_.budget > 0) spread(limit_share(1));
     if (has_many_inputs() || !edges_.empty()) recheck(false);
-    if (has_many_inputs()) { restart_until_settled(asker_.limit() / 5); }
+    if (has_many_inputs()) { restart_until_settled(budget() / 5); }
     return search_on(true);
   }
 
@@ -180,13 +182,15 @@ class Optimisation {
     const auto add = [&](Point x, const Region& r) {
       if (!space_.has_interaction() || r.contains(x)) points.push_back(std::move(x));
     };
-    for (const auto& r : regions_)
+    for (const auto& r : regions_) {
+      if (options_.budget > 0 && 6 * points.size() > static_cast<std::size_t>(options_.budget)) break;
       for (const int i : r.axes)
         for (const double end : {r.box.lower[i], r.box.upper[i]}) {
           Point x = calc_centre(space_);
           x[i] = end;
           add(std::move(x), r);
         }
+    }
     ask(points);
     points.clear();
     if (options_.lines > 0 && has_room_for_lines()) join_lines();
@@ -196,12 +200,12 @@ class Optimisation {
       const int n = static_cast<int>(r.axes.size());
       if (n == 0 || n > std::min(options_.corner_inputs, 20)) continue;
       corners += std::size_t{1} << n;
-      if (corners > static_cast<std::size_t>(asker_.limit()) / 3) break;
+      if (corners > static_cast<std::size_t>(budget()) / 3) break;
       for (auto& x : make_corners(r.box)) add(std::move(x), r);
     }
     ask(points);
     space_points_.assign(levels_.size(), 0);
-    spread(limit_share(1));
+    if (options_.budget == 0) spread(limit_share(1));
   }
 
   /// Spread points of a level, the first time.
@@ -242,7 +246,8 @@ class Optimisation {
         for (int k = 0; k < count_levels(space_, levels_, boxes_, x); ++k) ++space_points_[k];
   }
   /// The share that leaves two thirds of the runs to others.
-  double limit_share(double share) const { return share * std::min(1.0, asker_.limit() / 3.0 / count_spread()); }
+  double limit_share(double share) const { return share * std::min(1.0, budget() / 3.0 / count_spread()); }
+  int budget() const { return options_.budget > 0 ? options_.budget : asker_.limit(); }
 
   /// Along every axis from the best sample of each goal: the ends of the cut and places between. Finds other basins of
   /// mappings whose inputs act on their own.
@@ -308,7 +313,7 @@ class Optimisation {
   /// Whether lines through the middle take no more than a tenth of all runs. With fewer runs the spread ones tell more,
   /// and lines come last.
   bool has_room_for_lines() const {
-    return 20 * options_.lines * static_cast<int>(regions_.front().axes.size()) <= asker_.limit();
+    return 20 * options_.lines * static_cast<int>(regions_.front().axes.size()) <= budget();
   }
   bool has_line_searches() const { return options_.lines > 0 && !has_many_inputs(); }
 
@@ -995,7 +1000,9 @@ class Optimisation {
 
   void search_from_best(bool of_classes) {
     std::vector<Running> all;
+    int level = 0;
     for (const Goal& goal : make_goals(of_classes)) {
+      if (options_.budget > 0 && goal.level > std::exchange(level, goal.level)) advance(all), share_optima();
       const Candidate best = find_best(goal);
       if (regions_[goal.level].axes.empty() || best.sample < 0 || (of_classes && is_converged(goal, best))) continue;
       if (!of_classes) starts_[key_of(goal)].push_back(best.sample);

@@ -88,6 +88,9 @@ struct AlphaOptions {
   std::vector<double> levels = {0, 0.25, 0.5, 0.75, 1};
   /// Different points at most, those of `earlier` included, so that a repetition ends at the same point.
   int limit = 10000;
+  /// Runs that there are for it where others follow in the same asker (0: its limit). Then searches come first, wide
+  /// levels before narrow ones, and spread points last; ends of axes, corners and these take a sixth or a third each.
+  int budget = 0;
   /// Sobol points in the support and added in each inner cut. 0: 80 and 20 per input that has a width (measured on nine
   /// problems, docs/decisions/0018-fuzzy-analysis.md). At most a third of the limit; the same for corners.
   int space_points = 0, inner_points = 0;

@@ -65,6 +65,10 @@ void analyse(const Space& space, Asker& asker, const DesignOptions& options, Per
   AlphaOptions o = make_thrifty_options();
   o.levels = options.levels;
   o.seed = options.seed;
+  // fewer runs end no search, and points spread over the box tell more of it
+  constexpr int least_searching = 20;  // runs for each output and input
+  runs = std::min(runs, asker.rest());
+  if (runs > 0 && runs >= least_searching * asker.outputs() * static_cast<int>(b.inputs.size())) o.budget = runs;
   const int limit = asker.limit();
   asker.set_limit(std::min(limit, asker.asked() + runs));
   b.outputs = optimise(inner, asker, o).outputs;
@@ -598,7 +602,7 @@ void analyse_on(const Space& space, std::vector<PermissibleBox>& boxes, const Re
     const auto is_open = [](const PermissibleBox& b) { return b.kept && has_open_bounds(b); };
     auto open = std::ranges::count_if(boxes, is_open);
     for (PermissibleBox& b : boxes)
-      if (is_open(b)) analyse(space, asker, options, b, asker.rest() / static_cast<int>(open--));
+      if (is_open(b)) analyse(space, asker, options, b, --open > 0 ? (asker.rest() + 1) / 2 : asker.rest());
     if (asker.asked() == before) break;
     review_boxes(space, boxes, requirement, asker.archive(), options);
   }

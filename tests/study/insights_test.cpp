@@ -57,6 +57,8 @@ TEST(Budget, SharesRunsOutAndNeverPassesTheLimit) {
         EXPECT_LE(b.outcomes, b.limit);
         EXPECT_EQ(b.outcomes == b.limit, !has_boxes);
         EXPECT_LE(b.outcomes + 3 * b.requirement, b.limit) << "boxes keep most of theirs";
+        EXPECT_EQ(b.in_boxes > 0, has_boxes && limit >= 3000) << limit;
+        EXPECT_LE(b.outcomes + 6 * b.in_boxes, b.limit);
         EXPECT_EQ(b.rows + b.spread + b.knowing > 0, has_drivers);
         EXPECT_GT(b.bounds, limit / 4);
       }
@@ -284,6 +286,29 @@ TEST(InsightsReference, BoxOfTheJump) {
     EXPECT_TRUE(l.upper.converged) << l.alpha;
   }
   EXPECT_NEAR(b.outputs[0].levels[0].lower.value, b.box.lower[0] * b.box.lower[1] / 100 - 8, 1e-9);
+}
+
+TEST(InsightsReference, BoundsInTheBoxOfTheJumpEndWithFewRuns) {
+  const Folder folder;
+  Problem p = make_problem(uncertainty::cases::make_jump_inputs(), 1500);
+  p.permissible = "stands";
+  for (const int limit : {1500, 3000})
+    for (const int seed : {2, 5, 6}) {
+      p.limit = limit;
+      p.seed = seed;
+      const StudyResult r = run(p, folder, fmt::format("{} {}", limit, seed).c_str(), make_factories(calc_jump));
+      ASSERT_FALSE(r.insights.boxes.boxes.empty());
+      const uncertainty::PermissibleBox& b = r.insights.boxes.boxes.front();
+      ASSERT_TRUE(b.kept) << limit << " " << seed;
+      ASSERT_EQ(b.outputs.size(), 1u);
+      for (const uncertainty::LevelBounds& l : b.outputs[0].levels) {
+        // a product of positive numbers is least and largest in corners
+        const auto of = [&](auto end) { return end(b.inputs[0]) * end(b.inputs[1]) / 100 - 8; };
+        EXPECT_TRUE(l.lower.converged && l.upper.converged) << limit << " " << seed << " " << l.alpha;
+        EXPECT_NEAR(l.lower.value, of([&](const auto& x) { return x.cut(l.alpha).left; }), 1e-9);
+        EXPECT_NEAR(l.upper.value, of([&](const auto& x) { return x.cut(l.alpha).right; }), 1e-9);
+      }
+    }
 }
 
 TEST(InsightsReplay, AreReadBackWithTheSameBits) {
