@@ -493,9 +493,20 @@ class Optimisation {
 
   /// Where values fall ever more steeply towards another outcome, no model search beside one tells that nothing better
   /// is near.
-  bool is_steep(const Goal& goal) const { return steep_.contains(side_of(goal)); }
-  void note_steep(const Goal& goal) {
-    if (steep_.insert(side_of(goal)).second) forget_ends(goal);
+  bool is_steep(const Goal& goal) const { return steep_.contains({goal.output, goal.sign > 0, goal.outcome}); }
+  /// Of an outcome, and of all runs where these were searched.
+  void note_steep(Goal goal, int outcome) {
+    for (const int of : {goal.outcome, outcome}) {
+      goal.outcome = of;
+      if (steep_.insert({goal.output, goal.sign > 0, of}).second)
+        std::erase_if(ends_, [&](const auto& e) { return is_of_side(e.first, goal) && e.first[3] == of; });
+    }
+  }
+
+  /// Of bounds in an outcome, beside another one: to look once is enough.
+  Key key_of(const Goal& g, const Point& beside) const {
+    const int i = asker_.archive().find(beside);
+    return {g.output, i < 0 ? failed_outcome : outcome_of(asker_.archive()[i].result), g.sign > 0, g.outcome};
   }
 
   /// Whether searches for a bound ended at places of different values, or would have.
@@ -581,7 +592,7 @@ class Optimisation {
     o.tolerance = options_.tolerance * width_of(goal.output);
     if (seeks_edges()) o.edge = 1e-3;
     o.doubts_edges = !has_kinks(goal);
-    o.looks_steep = goal.outcome == any_class && !is_steep(goal);
+    if (!is_steep(goal)) o.looks_steep = [this, goal](const Point& x) { return !gentle_.contains(key_of(goal, x)); };
     o.seed = options_.seed + ++searches_;
     const Region& region = regions_[goal.level];
     const Point& from = asker_.archive()[start.sample].x;
@@ -651,7 +662,10 @@ class Optimisation {
     }
     for (const auto& r : all) {
       const auto* model = dynamic_cast<const ModelSearch*>(r.search.get());
-      if (model && model->is_steep()) note_steep(r.goal);
+      if (model && model->is_steep())
+        note_steep(r.goal, model->outcome());
+      else if (model && model->beside() && model->is_done() && r.goal.outcome != any_class)
+        gentle_.insert(key_of(r.goal, *model->beside()));
       if (model && model->is_wavy()) wavy_.insert(side_of(r.goal));
       if (r.has_stopped) {
         if (const int at = asker_.archive().find(r.search->best()); at >= 0) starts_[key_of(r.goal)].push_back(at);
@@ -1119,7 +1133,8 @@ class Optimisation {
   std::map<Key, std::vector<int>> starts_;  // samples from which searches began, or at which they stopped
   std::map<std::pair<int, bool>, std::vector<Optimum>> optima_;  // by output and sign
   std::set<std::pair<int, bool>> wavy_;                          // the same: values vary within little
-  std::set<std::pair<int, bool>> steep_;                         // the same: beside another outcome
+  std::set<Key> steep_;                                          // output, sign, outcome: beside another one
+  std::set<Key> gentle_;                                         // searches ended beside an outcome, and values do not
   std::map<Key, int> idle_rounds_;                               // in a row, that gained nothing
   bool has_shallow_valleys_ = false;                             // that searches were stopped in
   std::map<Key, Faces> faces_;

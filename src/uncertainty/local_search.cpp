@@ -16,6 +16,7 @@ constexpr int beyond = std::numeric_limits<int>::min();  // outcome of what lies
 constexpr int most_sections = 10;                        // that a jump is located by
 constexpr int most_jumps = 6;
 constexpr int most_approaches = 12;  // to another outcome, each half as far from it
+constexpr double near_wall = 8;      // radii; what is farther does not stop a search
 constexpr double much_steeper = 4;
 constexpr double ways_back[] = {1e-3, 1e-5};  // away from one, by widths
 constexpr double part_beyond = 0.3;  // of a jump, by which a place misses the model of this side that lies beyond
@@ -677,8 +678,10 @@ bool ModelSearch::look_steep() {
   const auto nearest = std::min_element(walls_.begin(), walls_.end(), [this](const Point& a, const Point& b) {
     return boundary_.calc_offset(a, best_) < boundary_.calc_offset(b, best_);
   });
+  const double distance = boundary_.calc_offset(*nearest, best_);
+  if (distance > near_wall * radius_ || !options_.looks_steep(*nearest)) return false;
+  beside_ = *nearest;
   near_ = {best_, value_}, far_ = {*nearest, infinite};
-  const double distance = boundary_.calc_offset(far_.x, best_);
   for (const double back : ways_back) {
     Point x = best_;
     for (const Axis& axis : axes_) x[axis.input] += back / distance * (best_[axis.input] - far_.x[axis.input]);

@@ -3,6 +3,7 @@
 /// batch for the model is wide (docs/theory/uncertainty.md, section 3).
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -71,10 +72,11 @@ class ModelSearch : public LocalSearch {
     double smallest = 1e-5;     // radius at which it ends anyway
     double edge = 0;            // the same where no other outcome was met
     bool doubts_edges = false;  // a nearer star tells kinks from narrow valleys
-    bool looks_steep = false;   // looks whether values fall ever more steeply towards another outcome
-    int iterations = 60;        // at most
-    int probes = 8;             // of the boundary of another outcome, at most
-    std::uint64_t seed = 1;     // for the subproblem under constraints
+    // whether to look for values that fall ever more steeply towards this place of another outcome
+    std::function<bool(const Point&)> looks_steep;
+    int iterations = 60;     // at most
+    int probes = 8;          // of the boundary of another outcome, at most
+    std::uint64_t seed = 1;  // for the subproblem under constraints
   };
   ModelSearch(Region region, Point start, const Told& at_start, const Options& options);
   void tell(std::span<const Told> told) override;
@@ -91,6 +93,8 @@ class ModelSearch : public LocalSearch {
   /// Whether values fall ever more steeply towards the outcome that it ended beside, as roots do: stars tell nothing
   /// there.
   bool is_steep() const { return is_steep_; }
+  /// The place of another outcome towards which it looked for that, and that it ended beside.
+  const std::optional<Point>& beside() const { return beside_; }
   /// What it may come to, as its gains shrink; -infinity as long as they do not.
   double calc_outlook() const;
   bool has_met_walls() const { return has_met_walls_; }
@@ -180,6 +184,7 @@ class ModelSearch : public LocalSearch {
   bool is_edge_checked_ = false;  // by another iteration at its radius
   double last_gain_ = 0, earlier_gain_ = 0;
   bool is_steep_ = false;
+  std::optional<Point> beside_;
   double first_slope_ = 0;  // of the value, on the way to the other outcome
   enum class Stage { Star, Inner, Probe, Trial, Section, Back, Approach } stage_ = Stage::Star;
   std::vector<Point> walls_;    // places of other outcomes, latest last

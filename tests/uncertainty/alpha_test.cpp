@@ -483,6 +483,33 @@ TEST(AlphaPhysics, BoundsBesideASteepWallAreMarked) {
   }
 }
 
+// The same within an outcome. The other one lies lower, so that bounds over all runs do not lead there.
+TEST(AlphaPhysics, BoundsOfAnOutcomeBesideASteepWallAreMarked) {
+  const Evaluate model = [](std::span<const Point> points, std::span<Result> out) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double a = points[i][0], b = points[i][1], d = .8 - a * a - (b - .5) * (b - .5);
+      out[i].outcome = b > .1 ? 0 : 1;
+      out[i].state = b > .1 && d < 0 ? Result::State::Failed : Result::State::Done;
+      if (b <= .1 || d >= 0) out[i].values = {b > .1 ? std::sqrt(d) + .4 * a : -3 - a - b};
+    }
+  };
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    AlphaOptions options;
+    options.seed = seed;
+    options.search_classes = true;
+    const AlphaResult r = optimise({make_triangular(-1, 0, 1), make_triangular(-1, .2, 1)}, model, options, {});
+    const auto up = std::ranges::find(r.classes, 0, &ClassBounds::outcome);
+    ASSERT_NE(up, r.classes.end());
+    const LevelBounds& support = up->outputs[0].levels[0];
+    const double least = -.4 * std::sqrt(.8), most = std::sqrt(1.16 * .8);  // on the wall, and where slopes vanish
+    EXPECT_FALSE(support.lower.converged) << "seed " << seed;
+    EXPECT_GE(support.lower.value, least - 1e-9);
+    EXPECT_LE(support.lower.value, least + .05) << "seed " << seed;
+    EXPECT_TRUE(support.upper.converged) << "seed " << seed;
+    EXPECT_NEAR(support.upper.value, most, 1e-6);
+  }
+}
+
 // At alpha = 1 plateaus vary and points do not, so planes of jumps and of outcomes are found in other spaces there.
 TEST(AlphaPhysics, CoresOfBothKindsBesideJumps) {
   const std::vector<FuzzyNumber> inputs = {make_triangular(0, .45, 1), make_trapezoidal(0, .3, .7, 1),

@@ -236,7 +236,7 @@ TEST(ModelSearch, SeesValuesFallSteeplyTowardsAWall) {
   };
   Random random(5);
   ModelSearch::Options options;
-  options.looks_steep = true;
+  options.looks_steep = [](const Point&) { return true; };
   for (int k = 0; k < 40; ++k) {
     Point start;
     do { start = {random.next(-1.5, 1.5), random.next(-1.5, 1.5)}; } while (calc_depth(start) < 0);
