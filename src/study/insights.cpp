@@ -13,7 +13,7 @@ namespace {
 using json = nlohmann::ordered_json;
 
 constexpr int least_rows = 32, most_rows = 256;
-constexpr std::size_t least_spread = 10;
+constexpr std::size_t least_spread = 30;               // of fewer points shares tell next to nothing
 constexpr int least_knowing = 20, most_knowing = 250;  // runs per input
 constexpr int least_with_bounds = 600;  // runs for boxes: of fewer, bounds in them are of a handful of points
 constexpr int least_in_boxes = 50;      // runs per input

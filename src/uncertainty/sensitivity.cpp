@@ -94,24 +94,17 @@ std::vector<Driver> calc_drivers(Columns c) {
   return drivers;
 }
 
-/// Share of a variance by one input: what is left inside bins of that input, of about as many samples as there are
-/// bins. The bin's mean takes 1/size of its variance if samples are independent, and almost nothing if they are spread
-/// evenly: the share is the middle of both cases, and half their distance is part of its error, beside the scatter over
-/// bins.
-Driver calc_share_by_bins(const std::vector<double>& x, std::vector<double> y) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const std::size_t count = x.size();
-  const std::size_t bins = static_cast<std::size_t>(std::sqrt(static_cast<double>(count)));
-  if (bins < 3) return {nan, nan, nan, nan};
-  Driver d{0, nan, 0, nan};
-  normalise({&y});
-  std::vector<std::size_t> order(count);
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return x[a] < x[b]; });
+/// Values in the order of one input, with their mean and variance.
+struct Ordered {
+  std::vector<double> y;
   double mean = 0, variance = 0;
-  for (const double v : y) mean += v / static_cast<double>(count);
-  for (const double v : y) variance += (v - mean) * (v - mean) / static_cast<double>(count - 1);
-  if (!(variance > rounding)) return d;
+};
+
+/// Share of a variance by one input: what is left inside bins of that input. The bin's mean takes 1/size of its
+/// variance if samples are independent, and almost nothing if they are spread evenly: the share is the middle of both
+/// cases, and half their distance is part of its error, beside the scatter over bins.
+Driver calc_share_by_bins(const Ordered& o, std::size_t bins) {
+  const std::size_t count = o.y.size();
   struct Bin {
     double weight, inside, whole;  // part of the samples; variance about the bin's mean and about that of all
   };
@@ -121,12 +114,11 @@ Driver calc_share_by_bins(const std::vector<double>& x, std::vector<double> y) {
     const std::size_t first = b * count / bins, last = (b + 1) * count / bins;
     const double size = static_cast<double>(last - first);
     double middle = 0;
-    for (std::size_t k = first; k < last; ++k) middle += y[order[k]] / size;
+    for (std::size_t k = first; k < last; ++k) middle += o.y[k] / size;
     Bin bin{size / static_cast<double>(count), 0, 0};
     for (std::size_t k = first; k < last; ++k) {
-      const double v = y[order[k]];
-      bin.inside += (v - middle) * (v - middle) / size;
-      bin.whole += (v - mean) * (v - mean) / size;
+      bin.inside += (o.y[k] - middle) * (o.y[k] - middle) / size;
+      bin.whole += (o.y[k] - o.mean) * (o.y[k] - o.mean) / size;
     }
     const double independent = bin.inside * size / (size - 1);
     doubt += 0.5 * bin.weight * (independent - bin.inside);
@@ -134,12 +126,38 @@ Driver calc_share_by_bins(const std::vector<double>& x, std::vector<double> y) {
     rest += bin.weight * bin.inside;
     list.push_back(bin);
   }
-  d.first = 1 - rest / variance;
+  Driver d{0, std::numeric_limits<double>::quiet_NaN(), 0, std::numeric_limits<double>::quiet_NaN()};
+  d.first = 1 - rest / o.variance;
   // inside - (1 - S) whole is 0 in the mean; its scatter over the bins is that of the share
   double sum = 0;
-  for (const Bin& b : list) sum += std::pow(b.weight * (b.inside - (1 - d.first) * b.whole) / variance, 2);
+  for (const Bin& b : list) sum += std::pow(b.weight * (b.inside - (1 - d.first) * b.whole) / o.variance, 2);
   const double many = static_cast<double>(bins);
-  d.first_error = std::hypot(std::sqrt(sum * many / (many - 1)), doubt / variance);
+  d.first_error = std::hypot(std::sqrt(sum * many / (many - 1)), doubt / o.variance);
+  return d;
+}
+
+/// The mean of three shares: of about as many bins as there are samples in each, one less and one more. Spread points
+/// may line up with bins of one number: how far the shares lie apart is part of the error.
+Driver calc_share(const std::vector<double>& x, std::vector<double> y) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::size_t count = x.size(), bins = static_cast<std::size_t>(std::sqrt(static_cast<double>(count)));
+  if (bins < 3) return {nan, nan, nan, nan};
+  normalise({&y});
+  std::vector<std::size_t> order(count);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return x[a] < x[b]; });
+  Ordered o;
+  for (const std::size_t k : order) o.y.push_back(y[k]);
+  for (const double v : y) o.mean += v / static_cast<double>(count);
+  for (const double v : y) o.variance += (v - o.mean) * (v - o.mean) / static_cast<double>(count - 1);
+  Driver d{0, nan, 0, nan};
+  if (!(o.variance > rounding)) return d;
+  const Driver shares[] = {calc_share_by_bins(o, bins - 1), calc_share_by_bins(o, bins),
+                           calc_share_by_bins(o, bins + 1)};
+  for (const Driver& s : shares) d.first += s.first / 3, d.first_error += s.first_error / 3;
+  double apart = 0;
+  for (const Driver& s : shares) apart += (s.first - d.first) * (s.first - d.first) / 2;
+  d.first_error = std::hypot(d.first_error, std::sqrt(apart));
   return d;
 }
 
@@ -166,7 +184,7 @@ Sensitivity read_drivers(const Space& space, const Archive& archive, const std::
     for (std::size_t k = 0; k < n; ++k) {
       for (std::size_t j = 0; j < list.size(); ++j) x[j] = archive[list[j]].x[k];
       const bool is_fuzzy = space.inputs[k].width() > 0;
-      drivers.push_back(is_fuzzy ? calc_share_by_bins(x, y) : Driver{});
+      drivers.push_back(is_fuzzy ? calc_share(x, y) : Driver{});
     }
     return drivers;
   };

@@ -87,6 +87,8 @@ TEST(InsightsReference, DriversOfIshigamiWithTheirErrors) {
     EXPECT_FALSE(is_share_known(r.insights.drivers.outputs[0][2])) << "nothing is known of an input that does nothing";
     EXPECT_EQ(std::isfinite(r.insights.drivers.outputs[0][0].total), limit == 4000);
   }
+  p.limit = 60;
+  EXPECT_EQ(run(p, folder, "few", model).insights.source, Insights::Source::None) << "18 spread runs tell nothing";
 }
 
 // y = 3 a + b, uniform over equal supports: shares 0.9 and 0.1.
