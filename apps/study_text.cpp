@@ -108,11 +108,14 @@ void print_outputs(std::FILE* out, const Problem& p, const StudyResult& r) {
   bool has_open = false, has_hidden = false, has_gap = false;
   for (std::size_t o = 0; o < r.alpha.outputs.size() && o < r.outputs.size(); ++o) {
     const double unit = study::find_output(p, r.outputs[o]).unit_value;
+    const uncertainty::LevelBounds& support = r.alpha.outputs[o].levels.front();
+    const int digits = study::calc_digits(support.lower.value, support.upper.value, 5);
     std::string line = fmt::format("  {:<{}}", title(o), width);
     for (const std::size_t k : shown) {
       const auto& l = r.alpha.outputs[o].levels[k];
-      const auto bound = [unit](const uncertainty::Bound& b) {
-        return b.sample < 0 ? std::string("-") : fmt::format("{:.5g}{}", b.value / unit, b.converged ? "" : "*");
+      const auto bound = [unit, digits](const uncertainty::Bound& b) {
+        return b.sample < 0 ? std::string("-")
+                            : fmt::format("{:.{}g}{}", b.value / unit, digits, b.converged ? "" : "*");
       };
       line += fmt::format("  {:>10} to {:<9}", bound(l.lower), bound(l.upper));
       has_gap = has_gap || l.lower.sample < 0;
@@ -249,8 +252,9 @@ std::string describe_state(const Problem& p, const study::StudyState& s) {
   for (std::size_t i = 0; i < std::min<std::size_t>(2, s.so_far->alpha.outputs.size()); ++i) {
     const auto& support = s.so_far->alpha.outputs[i].levels.front();
     const study::Quantity& q = study::find_output(p, s.so_far->outputs[i]);
-    text += fmt::format("; {} {:.5g} to {:.5g}{}{}", to_printable(q.name), support.lower.value / q.unit_value,
-                        support.upper.value / q.unit_value, q.unit.empty() ? "" : " ", q.unit);
+    const int digits = study::calc_digits(support.lower.value, support.upper.value, 5);
+    text += fmt::format("; {} {:.{}g} to {:.{}g}{}{}", to_printable(q.name), support.lower.value / q.unit_value, digits,
+                        support.upper.value / q.unit_value, digits, q.unit.empty() ? "" : " ", q.unit);
   }
   return text;
 }

@@ -21,9 +21,9 @@ namespace {
 
 using json = nlohmann::ordered_json;
 
-/// Seven digits are enough to draw and to read.
-json number(double x) {
-  return std::isfinite(x) ? json(std::strtod(fmt::format("{:.7g}", x).c_str(), nullptr)) : json(nullptr);
+/// Seven digits of what varies are enough to draw and to read.
+json number(double x, int digits = 7) {
+  return std::isfinite(x) ? json(std::strtod(fmt::format("{:.{}g}", x, digits).c_str(), nullptr)) : json(nullptr);
 }
 
 /// Runs at places that do not count (beyond a constraint, or outside a support that was made smaller) are left out:
@@ -51,6 +51,14 @@ json runs_json(const Problem& p, const StudyResult& r, const std::vector<int>& c
   for (const Curve& c : curves) points += c.is_outline ? 0 : c.at.size();
   std::vector<float> ordinates;
   ordinates.reserve(chosen.size() * points);
+  std::vector<int> digits;  // of outputs
+  for (std::size_t k = 0; k < r.outputs.size(); ++k) {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const int i : chosen)
+      if (const auto& values = r.alpha.archive[i].result.values; k < values.size() && std::isfinite(values[k]))
+        low = std::min(low, values[k]), high = std::max(high, values[k]);
+    digits.push_back(calc_digits(low, high, 7));
+  }
   for (const int i : chosen) {
     const uncertainty::Sample& s = r.alpha.archive[i];
     json inputs = json::array(), derived = json::array(), outputs = json::array();
@@ -61,7 +69,7 @@ json runs_json(const Problem& p, const StudyResult& r, const std::vector<int>& c
     }
     for (std::size_t k = 0; k < r.outputs.size(); ++k)
       outputs.push_back(k < s.result.values.size()
-                            ? number(s.result.values[k] / find_output(p, r.outputs[k]).unit_value)
+                            ? number(s.result.values[k] / find_output(p, r.outputs[k]).unit_value, digits[k])
                             : json(nullptr));
     out["inputs"].push_back(inputs);
     out["derived"].push_back(derived);

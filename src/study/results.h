@@ -62,4 +62,7 @@ void remove_result(const std::string& path);
 /// Returns the paths.
 std::vector<std::string> write_results(const std::string& folder, const Problem&, const StudyResult&);
 
+/// `digits`, and as many more as values between `low` and `high` need that vary little beside their size; 17 at most.
+int calc_digits(double low, double high, int digits);
+
 }  // namespace topple::study

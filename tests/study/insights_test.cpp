@@ -313,6 +313,14 @@ TEST(InsightsReference, BoundsInTheBoxOfTheJumpEndWithFewRuns) {
     }
 }
 
+TEST(Results, DigitsTellValuesApartThatVaryLittle) {
+  EXPECT_EQ(calc_digits(0, 1, 5), 5);
+  EXPECT_EQ(calc_digits(-3, 3, 5), 5);
+  EXPECT_EQ(calc_digits(1e5, 1e5 + 1e-3, 5), 14);
+  EXPECT_EQ(calc_digits(-1e9, -1e9 + 1e-6, 5), 17);
+  EXPECT_EQ(calc_digits(7, 7, 5), 5);
+}
+
 TEST(InsightsReplay, AreReadBackWithTheSameBits) {
   const Folder folder;
   Problem p = make_small_problem(2000);

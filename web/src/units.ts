@@ -39,6 +39,12 @@ export function formatNumber(value: number | null | undefined, digits = 4): stri
   return value.toFixed(decimals).replace("-", "−");
 }
 
+/// As many more digits as values need that vary little beside their size.
+export function digitsWithin(low: number, high: number, digits = 4): number {
+  const size = Math.max(Math.abs(low), Math.abs(high)), width = high - low;
+  return width > 0 && Number.isFinite(size) ? Math.min(15, digits + Math.max(0, Math.ceil(Math.log10(size / width) - 1e-9))) : digits;
+}
+
 /// With so many significant digits, by `round`; what is such a number but for its last bits stays that number.
 function roundTo(value: number, digits: number, round: (x: number) => number, slack: number): number {
   if (!(value > 0)) return value;

@@ -26,7 +26,7 @@ export function makeTicks(low: number, high: number, count = 5): number[] {
   return ticks;
 }
 
-export const tickText = (v: number): string => String(Number(v.toPrecision(6))).replace("-", "−");
+export const tickText = (v: number): string => String(Number(v.toPrecision(12))).replace("-", "−");
 
 /// The range of values with a margin; never empty.
 export function findRange(values: Iterable<number | null | undefined>, withZero = false): [number, number] {

@@ -1,5 +1,5 @@
 import { useState } from "preact/hooks";
-import { formatNumber } from "../units";
+import { digitsWithin, formatNumber } from "../units";
 import type { Point } from "../data";
 import { Chart, ValueTable, findRange, makePath, makeScale, makeTicks, tickText, useChartWidth } from "./chart";
 import { titleOf, unitWord, type Fan, type Level, type Output, type Study } from "./data";
@@ -23,16 +23,17 @@ function Membership(props: { study: Study; output: Output; index: number }) {
     return of === undefined || o.is_failure ? [] : [{ outcome: o, i, output: of }];
   });
   const parts = classes.length > 1 ? classes : [];
+  const digits = digitsWithin(output.levels[0]?.lower ?? 0, output.levels[0]?.upper ?? 0);
   const open = output.levels.some((l) => !l.converged[0] || !l.converged[1]);
   const rows = () =>
     [{ name: "all runs", output }, ...parts.map((c) => ({ name: nameOf(c.outcome), output: c.output }))].flatMap(({ name, output: o }) =>
-      o.levels.map((l) => [name, l.alpha, l.lower, l.upper, l.converged[0] && l.converged[1] ? "yes" : "no"]),
+      o.levels.map((l) => [name, l.alpha, formatNumber(l.lower, digits), formatNumber(l.upper, digits), l.converged[0] && l.converged[1] ? "yes" : "no"]),
     );
   return (
     <section class="panel plot" aria-label={`Membership of ${output.name}`} data-membership={output.name}>
       <h3>{titleOf(output)}</h3>
       <Chart
-        label={`Membership function of ${output.name}: at degree 0 from ${formatNumber(output.levels[0]?.lower)} to ${formatNumber(output.levels[0]?.upper)}`}
+        label={`Membership function of ${output.name}: at degree 0 from ${formatNumber(output.levels[0]?.lower, digits)} to ${formatNumber(output.levels[0]?.upper, digits)}`}
         x={findRange(output.levels.flatMap((l) => [l.lower, l.upper]))} y={[0, 1.04]} xTitle={titleOf(output)} yTitle="degree" width={400} height={210}
       >
         {(x, y) => (
@@ -46,7 +47,7 @@ function Membership(props: { study: Study; output: Output; index: number }) {
         )}
       </Chart>
       <p class="quiet plot-note">
-        centroid {formatNumber(output.centroid)} {unitWord(output.unit)}
+        centroid {formatNumber(output.centroid, digits)} {unitWord(output.unit)}
         {typeof output.robustness === "number" && ` · robustness ${formatNumber(output.robustness, 3)}`}
         {open && " · searches have not converged at every level: the true shape may be wider"}
       </p>

@@ -1,9 +1,9 @@
 /// All runs at once: parallel coordinates with brushes, the runs inside them as a table, one run with its values.
-import { useEffect, useRef, useState } from "preact/hooks";
-import { formatNumber } from "../units";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { digitsWithin, formatNumber } from "../units";
 import { say } from "../translate";
 import { makePath, makeScale, makeTicks, tickText } from "./chart";
-import { titleOf } from "./data";
+import { titleOf, type Maybe } from "./data";
 import { height as titleHeight, layTitles } from "./labels";
 import { lookOf, nameOf, type Axis, type State } from "./state";
 import { OutcomeName } from "./verdict";
@@ -210,8 +210,26 @@ function Limits(props: { state: State }) {
   );
 }
 
-function OneRun(props: { state: State }) {
-  const { state } = props;
+/// Digits with which each column tells its runs apart.
+function findDigits(columns: Maybe[][]): number[] {
+  return (columns[0] ?? []).map((_, k) => {
+    let low = Infinity, high = -Infinity;
+    for (const row of columns) {
+      const v = row[k];
+      if (typeof v === "number") (low = Math.min(low, v)), (high = Math.max(high, v));
+    }
+    return digitsWithin(low, high);
+  });
+}
+
+interface Digits {
+  inputs: number[];
+  derived: number[];
+  outputs: number[];
+}
+
+function OneRun(props: { state: State; digits: Digits }) {
+  const { state, digits } = props;
   const { study } = state;
   const table = study.run_table;
   const r = state.selected.value;
@@ -219,10 +237,10 @@ function OneRun(props: { state: State }) {
   const sample = table.sample[r] as number;
   const failure = table.failure[String(sample)];
   const pairs: [string, string][] = [
-    ...study.inputs.map((q, k): [string, string] => [titleOf(q), formatNumber(table.inputs[r]?.[k])]),
-    ...study.derived.map((q, k): [string, string] => [titleOf(q), formatNumber(table.derived[r]?.[k])]),
+    ...study.inputs.map((q, k): [string, string] => [titleOf(q), formatNumber(table.inputs[r]?.[k], digits.inputs[k])]),
+    ...study.derived.map((q, k): [string, string] => [titleOf(q), formatNumber(table.derived[r]?.[k], digits.derived[k])]),
     ["possibility of the inputs", formatNumber(table.membership[r])],
-    ...study.outputs.map((q, k): [string, string] => [titleOf(q), formatNumber(table.outputs[r]?.[k])]),
+    ...study.outputs.map((q, k): [string, string] => [titleOf(q), formatNumber(table.outputs[r]?.[k], digits.outputs[k])]),
   ];
   return (
     <div class="one-run" id="run" data-test="run">
@@ -241,6 +259,7 @@ export function Runs(props: { state: State }) {
   const table = study.run_table;
   const inside = [...state.inside.value].sort((a, b) => (table.membership[b] as number) - (table.membership[a] as number));
   const shown = inside.slice(0, mostRows);
+  const digits = useMemo(() => ({ inputs: findDigits(table.inputs), derived: findDigits(table.derived), outputs: findDigits(table.outputs) }), [table]);
   const toggle = (i: number): void => {
     const next = new Set(state.hiddenOutcomes.value);
     if (!next.delete(i)) next.add(i);
@@ -282,14 +301,14 @@ export function Runs(props: { state: State }) {
                   <td><button type="button" class="link" data-run={table.sample[r]} onClick={() => (state.selected.value = r)}>{table.sample[r]}</button></td>
                   <td class="name">{nameOf(study.outcomes[table.outcome[r] as number] ?? { name: "?", is_failure: false, runs: 0, possibility: 0, necessity: 0, outputs: [] })}</td>
                   <td>{formatNumber(table.membership[r], 3)}</td>
-                  {study.inputs.map((_, k) => <td>{formatNumber(table.inputs[r]?.[k])}</td>)}
-                  {study.outputs.slice(0, 3).map((_, k) => <td>{formatNumber(table.outputs[r]?.[k])}</td>)}
+                  {study.inputs.map((_, k) => <td>{formatNumber(table.inputs[r]?.[k], digits.inputs[k])}</td>)}
+                  {study.outputs.slice(0, 3).map((_, k) => <td>{formatNumber(table.outputs[r]?.[k], digits.outputs[k])}</td>)}
                 </tr>
               ))}
             </tbody>
           </table>
         </div>
-        <OneRun state={state} />
+        <OneRun state={state} digits={digits} />
       </div>
       {shown.length < inside.length && <p class="quiet">{`The ${shown.length} most possible of ${inside.length} runs are listed.`}</p>}
     </section>
