@@ -9,6 +9,7 @@
 #include "base/unit.h"
 #include "collapse/findings.h"
 #include "collapse/outcome.h"
+#include "collapse/vibration.h"
 #include "record/provenance.h"
 
 namespace topple::collapse {
@@ -41,6 +42,45 @@ void fill_ending(const mbs::Summary& s, const char* when, record::Record& record
 
 namespace {
 
+/// Numbers in their order, alike ones together: "4.2 m, 6 x 3.6 m".
+std::string join_runs(const std::vector<double>& values, const char* unit) {
+  std::string out;
+  for (size_t i = 0; i < values.size();) {
+    size_t end = i;
+    while (end < values.size() && values[end] == values[i]) ++end;
+    out +=
+        fmt::format("{}{}{:.4g} {}", i ? ", " : "", end - i > 1 ? fmt::format("{} x ", end - i) : "", values[i], unit);
+    i = end;
+  }
+  return out;
+}
+
+/// What was done before the first charge; members to which the same was done stand together.
+void fill_preparation(const product::Plan& plan, record::Record& r) {
+  std::vector<std::pair<std::string, std::string>> rows;  // what, names
+  const auto note = [&rows](const std::string& what, const std::string& name) {
+    const auto alike = std::ranges::find(rows, what, [](const auto& row) { return row.first; });
+    if (alike == rows.end())
+      rows.emplace_back(what, name);
+    else
+      alike->second += ", " + name;
+  };
+  for (const product::Member& m : plan.members) {
+    if (m.removed) note("taken out.", m.name);
+    for (const product::Weakening& w : m.weakenings) {
+      const std::string cut =
+          fmt::format("{:.3g} % of the bars and {:.3g} % of the concrete cut ", 100 * w.cut_bars, 100 * w.cut_concrete);
+      note(cut + (m.kind == product::MemberKind::Shaft
+                      ? fmt::format("over {:.2f} m around {:.2f} m, {:.4g} deg at azimuth {:.4g} deg.", w.height, w.at,
+                                    w.opening / unit::deg, w.azimuth / unit::deg)
+                      : fmt::format("at {:.2f} m.", w.at)),
+           m.name);
+    }
+  }
+  for (const auto& [what, names] : rows)
+    r.plan_values.push_back({"Blasting", "Before the first charge", names + ": " + what});
+}
+
 void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Record& r) {
   const auto add = [&r](const char* group, const std::string& key, const std::string& value) {
     r.plan_values.push_back({group, key, value});
@@ -52,7 +92,12 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
   };
   if (!plan.row_names.empty()) add("Building", "Rows", joined(plan.row_names, plan.row_offsets));
   if (!plan.frame_names.empty()) add("Building", "Frames", joined(plan.frame_names, plan.frame_offsets));
-  if (!plan.storey_heights.empty()) add("Building", "Storeys", std::to_string(plan.storey_heights.size()));
+  if (!plan.storey_heights.empty()) {
+    add("Building", "Storeys", std::to_string(plan.storey_heights.size()));
+    add("Building", "Heights of storeys", join_runs(plan.storey_heights, "m"));
+    if (std::ranges::any_of(plan.storey_loads, [](double load) { return load > 0; }))
+      add("Building", "Loads on floors", join_runs(plan.storey_loads, "kg/m2"));
+  }
   for (const product::Member& m : plan.members) {
     if (m.shaft < 0) continue;
     const product::Shaft& s = plan.shafts[static_cast<size_t>(m.shaft)];
@@ -78,6 +123,15 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
         fmt::format("{:.3g} x {:.3g} cm, bars {:.3g} cm2, ties {:.3g} mm every {:.3g} cm", s.width / unit::cm,
                     s.height / unit::cm, s.steel_area() / unit::cm2, s.tie_diameter / unit::mm,
                     s.tie_spacing / unit::cm));
+  for (const product::Panel& p : plan.panels) {
+    const std::string thickness = fmt::format("{:.3g} cm thick, ", p.thickness / unit::cm);
+    add("Sections", p.name,
+        p.concrete < 0
+            ? thickness + fmt::format("masonry of {:.3g} N/mm2", p.strength / unit::MPa)
+            : thickness + fmt::format("bars {:.3g} cm2/m at the top and {:.3g} cm2/m at the bottom",
+                                      p.as_top / (unit::cm * unit::cm), p.as_bottom / (unit::cm * unit::cm)));
+  }
+  fill_preparation(plan, r);
   for (const product::Stage& s : plan.stages) {
     // charges that are alike and fire together in one row
     std::vector<std::pair<std::pair<double, std::string>, std::string>> rows;
@@ -89,6 +143,7 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
       what += fmt::format("{:.2f} m destroyed around {:.2f} m, {:.3g} % of the bars left.", c.destroyed_length,
                           c.position, 100 * c.residual_bars);
       if (c.transition_damage > 0) what += fmt::format(" Damage beside it: {:.3g} %.", 100 * c.transition_damage);
+      if (c.scatter > 0) what += fmt::format(" Its time scatters by {:.3g} ms.", c.scatter * 1e3);
       if (c.fails) what += " It fails.";
       const std::pair<double, std::string> key{s.time + c.delay, what};
       const auto alike = std::find_if(rows.begin(), rows.end(), [&](const auto& row) { return row.first == key; });
@@ -123,6 +178,8 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
     if (n.clearance) add("Limits", "Clearance of " + n.name, fmt::format("{:.4g} m", *n.clearance));
     if (n.vibration_limit > 0)
       add("Limits", "Vibration of " + n.name, fmt::format("{:.4g} mm/s", n.vibration_limit / unit::mm));
+    if (n.building_class != product::BuildingClass::Unknown)
+      add("Limits", "Class of " + n.name, describe_vibration_limit(n.building_class));
   }
   add("Planned fall", "Azimuth",
       map.is_direction_planned

@@ -53,6 +53,27 @@ TEST(Run, ARecordIsWhole) {
   EXPECT_LT(r.provenance.step, 1e-3);
 }
 
+TEST(Run, TellsThePlanAPrintNeeds) {
+  const std::string stages = charge("C-A*-0", "0.1 s", "scatter = \"3 ms\"");
+  const std::string more =
+      "[preparation]\nremoved = [\"S-*-0\"]\n[[preparation.weaken]]\nmembers = [\"C-B1-0\"]\n"
+      "at = \"1.5 m\"\ncut_bars = 0.25\ncut_concrete = 0.4\n[[site.neighbour]]\n"
+      "name = \"No. 7\"\nfootprint = [[\"40 m\", \"0 m\"], [\"50 m\", \"0 m\"], [\"50 m\", \"9 m\"]]\n"
+      "building_class = \"residential\"\n";
+  const record::Record r = run_plan(read(house(stages, "0.2 s") + more), default_knowledge(), {}, {});
+  const auto value = [&r](const std::string& key, const std::string& part) {
+    return std::ranges::any_of(r.plan_values, [&](const record::KeyValue& v) {
+      return v.key == key && v.value.find(part) != std::string::npos;
+    });
+  };
+  EXPECT_TRUE(value("Heights of storeys", " m"));
+  EXPECT_TRUE(value("floor", "15 cm thick, bars 4 cm2/m at the top and 4 cm2/m at the bottom"));
+  EXPECT_TRUE(value("Before the first charge", "S-A1B2-0, S-A2B3-0: taken out."));
+  EXPECT_TRUE(value("Before the first charge", "C-B1-0: 25 % of the bars and 40 % of the concrete cut at 1.50 m."));
+  EXPECT_TRUE(value("Stage at 0.1 s at 0.1 s", "Its time scatters by 3 ms."));
+  EXPECT_TRUE(value("Class of No. 7", "residential buildings (line 2): 5 mm/s"));
+}
+
 TEST(Run, TellsChargesThatFailInTheirTurn) {
   const std::string stages = charge("C-A*-0", "0.1 s") + charge("C-B2-0", "0.2 s", "fails = true");
   const product::Plan plan = read(house(stages, "0.5 s"));

@@ -63,7 +63,7 @@ const sentences = german.filter(([english]) => english.includes("{")).map(makeSe
 export const commas = (text: string): string => text.replace(/„[^“]*“|(?<![\w.])(-?\d+)\.(\d+(?:e[+-]?\d+)?)(?![\d.]*\.\d|\w*\.\w)/g, (found, whole?: string, rest?: string) => (whole === undefined ? found : `${whole},${rest}`));
 
 /// What a measure may hold beside numbers: units, and words between numbers.
-const unit = /^(?:[numckMG]?m[23]?|m?s|[kM]?N|[kM]?Nm|[kM]?J|[kMG]?Pa|k?g|t|Hz|deg|mm\/s|m\/s2?|k?N\/m[23]?|kg\/m3|N\/mm2|x|to|and|up|bis|und)$/;
+const unit = /^(?:[numckMG]?m[23]?|m?s|[kM]?N|[kM]?Nm|[kM]?J|[kMG]?Pa|k?g|t|Hz|deg|mm\/s|m\/s2?|k?N\/m[23]?|kg\/m[23]|N\/mm2|x|to|and|up|bis|und)$/;
 /// A list in which decimal commas stand has semicolons between its parts.
 const part = (text: string): string => (/\d,\d/.test(text) ? text.replaceAll(", ", "; ") : text);
 /// Decimal commas in a number, or in several with their units; names keep their dots.
