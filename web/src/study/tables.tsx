@@ -15,7 +15,8 @@ const parameters: Record<string, (value: string) => string> = {
 function Share(props: { driver: Driver | undefined }) {
   const d = props.driver;
   if (d === undefined || d.first === null || d.first_error === null) return <td class="share"><span class="quiet">unknown</span></td>;
-  if (!isKnown(d)) return <td class="share"><span class="quiet">{`unknown, below ${formatNumber(Math.max(0, d.first) + 2 * d.first_error, 2)}`}</span></td>;
+  const most = Math.max(0.005, Math.max(0, d.first) + 2 * d.first_error); // what two digits tell from nothing
+  if (!isKnown(d)) return <td class="share"><span class="quiet">{`unknown, below ${formatNumber(most, 2)}`}</span></td>;
   const percent = (v: number): string => `${Math.min(100, Math.max(0, 100 * v))}%`;
   return (
     <td class="share">
