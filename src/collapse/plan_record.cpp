@@ -68,13 +68,15 @@ void fill_preparation(const product::Plan& plan, record::Record& r) {
   for (const product::Member& m : plan.members) {
     if (m.removed) note("taken out.", m.name);
     for (const product::Weakening& w : m.weakenings) {
-      const std::string cut =
-          fmt::format("{:.3g} % of the bars and {:.3g} % of the concrete cut ", 100 * w.cut_bars, 100 * w.cut_concrete);
-      note(cut + (m.kind == product::MemberKind::Shaft
-                      ? fmt::format("over {:.2f} m around {:.2f} m, {:.4g} deg at azimuth {:.4g} deg.", w.height, w.at,
-                                    w.opening / unit::deg, w.azimuth / unit::deg)
-                      : fmt::format("at {:.2f} m.", w.at)),
-           m.name);
+      const double bars = 100 * w.cut_bars, concrete = 100 * w.cut_concrete;
+      note(
+          m.kind == product::MemberKind::Shaft
+              ? fmt::format(
+                    "{:.3g} % of the bars and {:.3g} % of the concrete cut over {:.2f} m around {:.2f} m, {:.4g} "
+                    "deg at azimuth {:.4g} deg.",
+                    bars, concrete, w.height, w.at, w.opening / unit::deg, w.azimuth / unit::deg)
+              : fmt::format("{:.3g} % of the bars and {:.3g} % of the concrete cut at {:.2f} m.", bars, concrete, w.at),
+          m.name);
     }
   }
   for (const auto& [what, names] : rows)

@@ -642,7 +642,7 @@ std::vector<std::string> write_results(const std::string& folder, const Problem&
 int calc_digits(double low, double high, int digits) {
   const double size = std::max(std::abs(low), std::abs(high)), width = high - low;
   if (!(width > 0) || !std::isfinite(size)) return digits;
-  return std::min(17, digits + std::max(0, static_cast<int>(std::ceil(std::log10(size / width) - 1e-9))));
+  return std::min(17, digits + std::max(0, static_cast<int>(std::floor(std::log10(size / width) + 1e-9))));
 }
 
 }  // namespace topple::study

@@ -315,8 +315,9 @@ TEST(InsightsReference, BoundsInTheBoxOfTheJumpEndWithFewRuns) {
 
 TEST(Results, DigitsTellValuesApartThatVaryLittle) {
   EXPECT_EQ(calc_digits(0, 1, 5), 5);
-  EXPECT_EQ(calc_digits(-3, 3, 5), 5);
-  EXPECT_EQ(calc_digits(1e5, 1e5 + 1e-3, 5), 14);
+  EXPECT_EQ(calc_digits(-3, 30, 5), 5);
+  EXPECT_EQ(calc_digits(2, 3, 5), 5);
+  EXPECT_EQ(calc_digits(1e5, 1e5 + 1e-3, 5), 13);
   EXPECT_EQ(calc_digits(-1e9, -1e9 + 1e-6, 5), 17);
   EXPECT_EQ(calc_digits(7, 7, 5), 5);
 }

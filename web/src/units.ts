@@ -42,7 +42,7 @@ export function formatNumber(value: number | null | undefined, digits = 4): stri
 /// As many more digits as values need that vary little beside their size.
 export function digitsWithin(low: number, high: number, digits = 4): number {
   const size = Math.max(Math.abs(low), Math.abs(high)), width = high - low;
-  return width > 0 && Number.isFinite(size) ? Math.min(15, digits + Math.max(0, Math.ceil(Math.log10(size / width) - 1e-9))) : digits;
+  return width > 0 && Number.isFinite(size) ? Math.min(15, digits + Math.max(0, Math.floor(Math.log10(size / width) + 1e-9))) : digits;
 }
 
 /// With so many significant digits, by `round`; what is such a number but for its last bits stays that number.
