@@ -80,7 +80,7 @@ void fill_preparation(const product::Plan& plan, record::Record& r) {
     }
   }
   for (const auto& [what, names] : rows)
-    r.plan_values.push_back({"Blasting", "Before the first charge", names + ": " + what});
+    r.plan_values.push_back({"Blasting", "Before the first charge", fmt::format("{}: {}", names, what)});
 }
 
 void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Record& r) {
