@@ -55,16 +55,20 @@ std::string join_runs(const std::vector<double>& values, const char* unit) {
   return out;
 }
 
+/// Members of which the same is to be said, under what that is, in one row.
+template <class Key>
+void note_alike(std::vector<std::pair<Key, std::string>>& rows, const Key& key, const std::string& name) {
+  const auto alike = std::ranges::find(rows, key, &std::pair<Key, std::string>::first);
+  if (alike == rows.end())
+    rows.emplace_back(key, name);
+  else
+    alike->second += ", " + name;
+}
+
 /// What was done before the first charge; members to which the same was done stand together.
 void fill_preparation(const product::Plan& plan, record::Record& r) {
   std::vector<std::pair<std::string, std::string>> rows;  // what, names
-  const auto note = [&rows](const std::string& what, const std::string& name) {
-    const auto alike = std::ranges::find(rows, what, [](const auto& row) { return row.first; });
-    if (alike == rows.end())
-      rows.emplace_back(what, name);
-    else
-      alike->second += ", " + name;
-  };
+  const auto note = [&rows](const std::string& what, const std::string& name) { note_alike(rows, what, name); };
   for (const product::Member& m : plan.members) {
     if (m.removed) note("taken out.", m.name);
     for (const product::Weakening& w : m.weakenings) {
@@ -148,11 +152,7 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
       if (c.scatter > 0) what += fmt::format(" Its time scatters by {:.3g} ms.", c.scatter * 1e3);
       if (c.fails) what += " It fails.";
       const std::pair<double, std::string> key{s.time + c.delay, what};
-      const auto alike = std::find_if(rows.begin(), rows.end(), [&](const auto& row) { return row.first == key; });
-      if (alike == rows.end())
-        rows.emplace_back(key, m.name);
-      else
-        alike->second += ", " + m.name;
+      note_alike(rows, key, m.name);
     }
     for (const auto& [key, names] : rows)
       add("Blasting", fmt::format("{} at {:g} s", s.name, key.first), names + ": " + key.second);

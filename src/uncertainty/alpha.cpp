@@ -1134,7 +1134,7 @@ class Optimisation {
   std::map<std::pair<int, bool>, std::vector<Optimum>> optima_;  // by output and sign
   std::set<std::pair<int, bool>> wavy_;                          // the same: values vary within little
   std::set<Key> steep_;                                          // output, sign, outcome: beside another one
-  std::set<Key> gentle_;                                         // searches ended beside an outcome, and values do not
+  std::set<Key> gentle_;                                         // of bounds that were looked at for that and are not
   std::map<Key, int> idle_rounds_;                               // in a row, that gained nothing
   bool has_shallow_valleys_ = false;                             // that searches were stopped in
   std::map<Key, Faces> faces_;
