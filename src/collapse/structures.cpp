@@ -102,15 +102,17 @@ void Builder::find_structures() {
   for (const mbs::ZoneElement& e : model.elements) follow(e.a, e.b);
   for (const mbs::Joint& j : model.joints) follow(j.parent, j.child);
   if (!left.empty())
-    map.notes.push_back({"Structures without a charge",
-                         fmt::format("No charge acts on {} of {} separate structures ({}): the mechanism is judged "
-                                     "without what stands there.",
-                                     left.size(), order.size(), join(left))});
+    map.notes.push_back(
+        {"Structures without a charge",
+         fmt::format("No charge acts on {} of {} separate structures (with {}): the mechanism is judged "
+                     "without what stands there.",
+                     left.size(), order.size(), join(left))});
   if (judged.size() > 1 && has_charges)
-    map.notes.push_back({"Separate structures",
-                         fmt::format("Charges act on {} separate structures ({}): the mechanism of each is judged by "
-                                     "itself. Curves of tilt and height are those of {}.",
-                                     judged.size(), join(judged), judged.front())});
+    map.notes.push_back(
+        {"Separate structures",
+         fmt::format("Charges act on {} separate structures (with {}): the mechanism of each is judged by "
+                     "itself. Curves of tilt and height are those of the one with {}.",
+                     judged.size(), join(judged), judged.front())});
 }
 
 }  // namespace topple::collapse

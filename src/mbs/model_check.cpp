@@ -663,7 +663,11 @@ std::vector<Complaint> Checker::find() {
 std::vector<Complaint> find_complaints(const Model& model) { return Checker(model).find(); }
 
 void check_step(double step, double duration) {
-  if (!(step > 0) || duration <= kMostSteps * step) return;
+  if (!(step > 0)) return;
+  if (step > duration)
+    throw InputError("E606", fmt::format("a step of {:.3g} s is longer than the run of {:.6g} s", step, duration),
+                     "give a shorter step, or none");
+  if (duration <= kMostSteps * step) return;
   throw InputError(
       "E606",
       fmt::format("a step of {:.3g} s is too short for {:.6g} s: the run would take {:.2g} steps, at most {:g} "

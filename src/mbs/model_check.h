@@ -18,7 +18,8 @@ struct Complaint {
 /// Empty if the model can be run.
 std::vector<Complaint> find_complaints(const Model&);
 
-/// Throws InputError E606 for a set step (> 0) with which a run of that duration would take more than kMostSteps [s].
+/// Throws InputError E606 for a set step (> 0) that is longer than the run, or with which it would take more than
+/// kMostSteps [s].
 void check_step(double step, double duration);
 
 }  // namespace topple::mbs

@@ -106,7 +106,7 @@ inline constexpr double kMostSteps = 1e9;
 
 struct Options {
   double duration = 1;  // [s]
-  double step = 0;      // 0: step_safety times the limit of the stiffest mode; else at least duration / kMostSteps
+  double step = 0;      // 0: step_safety times the limit of the stiffest mode; else duration / kMostSteps to duration
   double step_safety = 0.9;
   /// The engine's own step lets no free body turn by more than this at its present rate [rad] when it is chosen, and is
   /// chosen anew where one turns by four times as much; and there are at least so many in the duration; 0: it does not

@@ -136,13 +136,15 @@ void check_times(Reading& reading, const std::vector<const Node*>& nodes, const 
                        "stage[" + std::to_string(i) + "]: time: is not after the stage before it",
                        "stages are given in the order in which they fire");
   const double duration = reading.plan.analysis.duration;
+  for (size_t i = 0; i < stages.size(); ++i)
+    if (stages[i].time >= duration)
+      complaints.error("E407", place_of_time(i), "time: the stage fires at or after the end of the analysis",
+                       "raise duration in [analysis], or fire earlier");
   for (const Firing& firing : firings) {
     const double time = stages[firing.stage].time, next = time + firing.delay;
     const bool has_next = firing.stage + 1 < stages.size();
-    if (time >= duration) {
-      complaints.error("E407", place_of_time(firing.stage), "time: the stage fires at or after the end of the analysis",
-                       "raise duration in [analysis], or fire earlier");
-    } else if (next >= duration) {
+    if (time >= duration) continue;
+    if (next >= duration) {
       complaints.error("E407", firing.place, "the charge fires at or after the end of the analysis",
                        "raise duration in [analysis], or shorten its delay");
     } else if (has_next && stages[firing.stage + 1].time > time && next >= stages[firing.stage + 1].time) {

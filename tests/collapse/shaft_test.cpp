@@ -437,8 +437,9 @@ TEST(Structures, WhatNoChargeActsOnIsNotJudged) {
   }
   ASSERT_FALSE(b.map.notes.empty());
   EXPECT_EQ(b.map.notes.front().title, "The mouth of tower") << "a finding's title says what it is about";
-  EXPECT_EQ(b.map.notes.back().text,
-            "No charge acts on 1 of 2 separate structures (low): the mechanism is judged without what stands there.");
+  EXPECT_EQ(
+      b.map.notes.back().text,
+      "No charge acts on 1 of 2 separate structures (with low): the mechanism is judged without what stands there.");
 }
 
 TEST(Structures, ThoseThatChargesActOnAreJudgedOneByOneTheHeaviestFirst) {
@@ -451,7 +452,7 @@ TEST(Structures, ThoseThatChargesActOnAreJudgedOneByOneTheHeaviestFirst) {
   EXPECT_EQ(b.map.structures[0].name, "tower");
   EXPECT_EQ(b.map.structures[1].name, "low");
   EXPECT_NEAR(b.map.structures[0].mass / b.map.structures[1].mass, 37.5 / 17.5, 1e-6);
-  EXPECT_NE(b.map.notes.back().text.find("Charges act on 2 separate structures (tower, low)"), std::string::npos);
+  EXPECT_NE(b.map.notes.back().text.find("Charges act on 2 separate structures (with tower, low)"), std::string::npos);
 }
 
 TEST(Structures, TheUpperBlockOfAShaftStandsOnItsLowestMouth) {

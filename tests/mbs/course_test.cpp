@@ -406,10 +406,12 @@ TEST(Rest, WaitsForLawsThatStillGoOver) {
   }
 }
 
-TEST(Step, IsRefusedWhereTheRunWouldHaveNoEnd) {
+TEST(Step, IsRefusedWhereTheRunWouldHaveNoEndOrNoStep) {
   Model m = make_hanging();
   Options o;
   o.duration = 1, o.step = 0.99e-9, o.equilibrium = false;
+  EXPECT_THROW((void)run(m, o), InputError);
+  o.step = 1.001;  // nor one longer than the run
   EXPECT_THROW((void)run(m, o), InputError);
   o.step = 0;
   m.elements[0].translational_stiffness = {1e27, 1e27, 1e27};

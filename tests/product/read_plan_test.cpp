@@ -290,6 +290,14 @@ TEST(ReadPlan, ReportsEverythingAtOnceInTheOrderOfTheFile) {
   EXPECT_EQ(codes, (std::vector<std::string>{"E204", "E204", "E203", "E206"})) << rendered(complaints, text);
 }
 
+TEST(ReadPlan, SaysOnceThatAStageIsLate) {
+  std::string text = replaced(small_plan(), "duration = \"5 s\"", "duration = \"1.5 s\"");
+  text += "[[stage.charge]]\nmembers = [\"C-B3-0\"]\nposition = \"2.6 m\"\ndestroyed_length = \"0.2 m\"\n";
+  const std::vector<Diagnostic> complaints = complaints_about(text);
+  ASSERT_EQ(complaints.size(), 1u) << rendered(complaints, text);
+  EXPECT_EQ(complaints[0].code, "E407");
+}
+
 TEST(ReadPlan, StopsCountingAtAHundredErrors) {
   std::string text = small_plan();
   for (int i = 0; i < 1000; ++i) text += "key" + std::to_string(i) + " = 1\n";
