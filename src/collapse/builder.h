@@ -158,6 +158,8 @@ struct Builder : BuilderState {
   void note_mouth(const product::Member&, const product::Shaft&, const ShaftModel&, const ShaftJoint&);
   const product::Charge& charge_of(const ShaftElement&) const;
   void connect_cables();
+  /// Of beams along x, and of slabs that span between them.
+  void find_span_margins();
   /// Which bodies stand by themselves, on which of these charges act, and what is their upper block.
   void find_structures();
   /// Whether a frame's members are connected; whether those to the next frame are.

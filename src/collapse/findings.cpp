@@ -211,6 +211,21 @@ std::string tell_heads(const Context& c, bool is_across) {
          (yielded.empty() ? "" : ", and " + yielded) + ".";
 }
 
+/// What spans bear as mechanisms that the model has no hinges for, where that is less than the margin of its zones.
+std::string tell_spans(const Context& c, double margin) {
+  const std::vector<SpanMargin>& spans = c.map.spans;
+  if (spans.empty() || spans[0].margin >= margin) return "";
+  const auto weak = std::count_if(spans.begin(), spans.end(), [](const SpanMargin& s) { return s.margin < 1; });
+  const std::string lowest =
+      fmt::format(" With hinges at both ends and in the middle {} bears {:.2f} times its dead load at the most",
+                  spans[0].member, spans[0].margin);
+  if (weak == 0) return lowest + ".";
+  return lowest + fmt::format(
+                      ": as described it could not stand, and the model does not see that. So it is with {} of {} "
+                      "spans; check their bars.",
+                      weak, spans.size());
+}
+
 /// Whether a state is nearer to its resistance than another: zones that have yielded stand on it.
 bool is_nearer(const ZoneFrame& a, const ZoneFrame& b) {
   if ((a.yielded > 0) != (b.yielded > 0)) return a.yielded > 0;
@@ -260,6 +275,8 @@ Standing add_stability(const Context& c) {
       text += fmt::format(" of {} members.", margins.size());
     }
     if (across != nullptr && is_standing) text += tell_heads(c, is_across);
+    if (!settled && is_standing) text += tell_spans(c, margin);
+    const bool has_weak_span = !settled && !c.map.spans.empty() && c.map.spans[0].margin < 1;
     bool is_still = true, may_fall = false;
     if (settled && is_standing) {
       is_still = block[i].fastest < c.k.rest_speed;
@@ -275,11 +292,11 @@ Standing add_stability(const Context& c) {
         text += fmt::format(" This is the margin of one instant: the least in the pause is {:.2f}, at {:.2f} s.",
                             1 / zones[worst].utilisation, zones[worst].time);
     }
-    const Status status = !is_standing                                 ? Status::Bad
-                          : may_fall                                   ? Status::NotJudged
-                          : z.yielded > 0 || z.broken > 0 || !is_still ? Status::Warning
-                          : across != nullptr && across->zones.empty() ? Status::Warning
-                                                                       : Status::Good;
+    const Status status = !is_standing                                                  ? Status::Bad
+                          : may_fall                                                    ? Status::NotJudged
+                          : z.yielded > 0 || z.broken > 0 || !is_still || has_weak_span ? Status::Warning
+                          : across != nullptr && across->zones.empty()                  ? Status::Warning
+                                                                                        : Status::Good;
     c.add(id, "Stability", title, text, margin, "1", status);
     return is_standing;
   };

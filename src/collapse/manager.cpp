@@ -558,6 +558,7 @@ void Builder::build() {
   connect_cables();
   stop_if_wrong();
   find_structures();
+  if (!condensation) find_span_margins();
   for (size_t s = 0; s < plan.storey_loads.size(); ++s) {
     const bool has_slab = std::any_of(slabs.begin(), slabs.end(),
                                       [&](const auto& entry) { return entry.first.storey == static_cast<int>(s); });

@@ -78,11 +78,17 @@ struct StubEntry {
   double peak = 0;    // shortening at its compressive strength [m]
 };
 
-/// Ties between plan and model. B bodies, E zone elements, R rotational elements, J joints.
 struct ModelNote {
   std::string title, text;  // a sentence or two
 };
 
+/// What a beam or slab bears of its dead load at the most, with hinges at both ends and in the middle of its span.
+struct SpanMargin {
+  std::string member;
+  double margin = 0;  // capacity over demand
+};
+
+/// Ties between plan and model. B bodies, E zone elements, R rotational elements, J joints.
 struct ModelMap {
   std::vector<BodyEntry> bodies;       // (B)
   std::vector<ZoneEntry> elements;     // (E)
@@ -92,6 +98,7 @@ struct ModelMap {
   std::vector<DebrisEntry> debris;
   std::vector<StubEntry> stubs;
   std::vector<GroundColumn> ground_columns;
+  std::vector<SpanMargin> spans;               // beams along x and slabs between them; the lowest first
   std::vector<StructureEntry> structures{{}};  // that charges act on, or all if none does; the heaviest first
   std::vector<std::string> stages;             // a line for each stage of the plan
   std::vector<Firing> schedule;                // failing charges included

@@ -647,6 +647,45 @@ TEST(Manager, TheOrderOfTwoSlabsBesideABeamChangesNothing) {
   }
 }
 
+TEST(Manager, SpansBearWhatThreeHingesBear) {
+  const std::string slabs =
+      "[slab.strong]\nthickness = \"20 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\nas_top = \"3 cm2/m\"\n"
+      "as_bottom = \"6 cm2/m\"\ncover = \"3 cm\"\n";
+  const auto margins = [&](const std::string& load, const std::string& more = "") {
+    const Built b =
+        build(read(materials() + slabs + grid("A = \"0 m\", B = \"6 m\"", "1 = \"0 m\", 2 = \"5 m\"", 1, load) +
+                   "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n[[slabs]]\npanel = "
+                   "\"strong\"\n" +
+                   more + analysis()),
+              without_limit());
+    std::map<std::string, double> of;
+    for (const SpanMargin& s : b.map.spans) of[s.member] = s.margin;
+    EXPECT_TRUE(std::is_sorted(b.map.spans.begin(), b.map.spans.end(),
+                               [](const SpanMargin& l, const SpanMargin& r) { return l.margin < r.margin; }));
+    return of;
+  };
+  const auto light = margins("1 kN/m2"), heavy = margins("6 kN/m2");
+  EXPECT_EQ(light.size(), 3u) << "two beams along x and the slab";
+  // the slab between the faces of its beams, a block of stresses over its bars
+  const auto moment = [](double as) { return as * 420e6 * (0.17 - 0.5 * as * 420e6 / (0.85 * 25e6)); };
+  // what its corners share with columns counts there
+  const double g = 9.81, slab = (1 - 0.3 * 0.4 / 30) * 2500 * g * 0.2, span = 4.7,
+               bears = 8 * (moment(6e-4) + moment(3e-4)) / (span * span);
+  EXPECT_NEAR(light.at("S-A1B2-0"), bears / (slab + 1e3), 1e-6 * light.at("S-A1B2-0"));
+  EXPECT_NEAR(heavy.at("S-A1B2-0"), bears / (slab + 6e3), 1e-6 * heavy.at("S-A1B2-0"));
+  // a beam with half of the slab, 5.6 m between columns: bars between first yield and their strength, with the lever of
+  // a slab that is pressed and of a web that is
+  const double bars = M_PI * 1e-4, lever = 0.5 - 0.03 - 0.008 - 0.01,
+               weight = 5.6 * (2500 * g * 0.3 * 0.5 + 2.5 * (slab + 1e3));
+  const double least = 8 * 420e6 * bars * (3 + 4) * 0.85 * lever / (5.6 * weight),
+               most = 8 * 500e6 * (bars * (3 + 4) + 6e-4 * 5) * lever / (5.6 * weight);
+  EXPECT_GT(light.at("B-A1B1-0"), least);
+  EXPECT_LT(light.at("B-A1B1-0"), most);
+  // a wall that is cast on a beam bears it
+  const auto walled = margins("1 kN/m2", "[[walls]]\npanel = \"thin\"\nat = \"A1B1\"\nstoreys = 0\n");
+  EXPECT_EQ(walled.count("B-A1B1-0"), 1u) << "it stands below";
+}
+
 TEST(Manager, WhatWasTakenOutCoversNoMember) {
   const std::string frame = materials() + grid("A = \"0 m\", B = \"5 m\"", "1 = \"0 m\", 2 = \"4 m\"", 1) +
                             "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n";

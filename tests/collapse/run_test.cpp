@@ -226,6 +226,29 @@ TEST(RunPhysics, ZonesThatYieldUnderDeadLoadHaveNoMarginLeft) {
   }
 }
 
+TEST(Run, SaysWhatSpansCannotBear) {
+  // a slab's zone lies at mid-span, so bars that lack at its supports pass the model unseen
+  const auto start = [](const std::string& top) {
+    return finding(
+        run_plan(
+            read(materials() + "[slab.poor]\nthickness = \"18 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\nas_top = \"" +
+                 top + "\"\nas_bottom = \"6 cm2/m\"\n" +
+                 grid("A = \"0 m\", B = \"5 m\"", "1 = \"0 m\", 2 = \"5.5 m\", 3 = \"12 m\"", 1, "7 kN/m2") +
+                 "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n[[slabs]]\npanel = "
+                 "\"poor\"\n" +
+                 analysis("0.05 s")),
+            default_knowledge(), {}, {}),
+        "stability.start");
+  };
+  const record::Finding none = start("0 cm2/m"), enough = start("12 cm2/m");
+  EXPECT_EQ(none.status, record::Status::Warning);
+  EXPECT_GT(none.value, 1);
+  EXPECT_THAT(none.text, testing::HasSubstr("With hinges at both ends and in the middle S-A2B3-0 bears 0.9"));
+  EXPECT_THAT(none.text, testing::HasSubstr("it could not stand"));
+  EXPECT_THAT(none.text, testing::HasSubstr("So it is with 1 of 5 spans"));
+  EXPECT_EQ(enough.text.find("With hinges"), std::string::npos) << enough.text;
+}
+
 TEST(RunPhysics, BeamsThatTwistDoNotMakeMasonryYield) {
   // slabs lie on one side of the gable beams; what masonry between them bears is no part of the building's margin
   const auto start = [](const std::string& walls) {

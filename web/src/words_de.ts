@@ -77,6 +77,8 @@ export const german: readonly (readonly [string, string])[] = [
   ["Lowest margins: {l} of {} members.", "Kleinste Reserven: {} (von {} Bauteilen)."],
   ["Heads of ground columns turn about {} here; about {} the margin is {:.2f}.", "Köpfe der Erdgeschossstützen drehen sich hier um {}; um {} ist die Reserve {}."],
   ["Heads of ground columns turn about {} here; about {} the margin is {:.2f}, and {} zone has yielded.", "Köpfe der Erdgeschossstützen drehen sich hier um {}; um {} ist die Reserve {}, und {} Zone fließt."],
+  ["With hinges at both ends and in the middle {n} bears {:.2f} times its dead load at the most.", "Mit Gelenken an beiden Enden und in der Mitte trägt {} höchstens das {}-Fache seiner Eigenlast."],
+  ["With hinges at both ends and in the middle {n} bears {:.2f} times its dead load at the most: as described it could not stand, and the model does not see that. So it is with {} of {} spans; check their bars.", "Mit Gelenken an beiden Enden und in der Mitte trägt {} höchstens das {}-Fache seiner Eigenlast: So beschrieben könnte es nicht stehen, und das Modell sieht das nicht. So ist es bei {} von {} Feldern; Bewehrung prüfen."],
   ["Heads of ground columns turn about {} here; about {} the margin is {:.2f}, and {} zones have yielded.", "Köpfe der Erdgeschossstützen drehen sich hier um {}; um {} ist die Reserve {}, und {} Zonen fließen."],
   ["About the other axis of the columns' heads it was not computed: cancelled.", "Um die andere Achse der Stützenköpfe wurde nicht gerechnet: abgebrochen."],
   ["Heads of ground columns turn about {} here; about {} no zone is loaded.", "Köpfe der Erdgeschossstützen drehen sich hier um {}; um {} ist keine Zone belastet."],
