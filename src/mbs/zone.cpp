@@ -347,6 +347,7 @@ struct Evaluation {
   const Bending planes[2];                //
   double force[6] = {0, 0, 0, 0, 0, 0};   // elastic resultants at the marker
   double station_stiffness[2][2];         // [q][s]
+  double cross[2] = {0, 0};               // of two stations against each other's rotation [q]
   double phi[2][2];                       // inelastic rotation, damage included [q][s]
   double m[2][2];                         // moment at the station [q][s]
   double phi_trial[2][2], m_trial[2][2];  // before stations turn [q][s]
@@ -386,24 +387,31 @@ struct Evaluation {
       station_stiffness[q][s] = planes[q].bending_stiffness + p.x[s] * p.x[s] * planes[q].shear_stiffness;
       phi[q][s] = z.station[s].phi[q];
     }
-    // cracks and damage add flexibility at the stations: (1 + S C) m = m0, two by two at most
-    double c[2] = {0, 0};
-    for (int s = 0; s < n; ++s) c[s] = z.station[s].soft[q];
-    if (c[0] > 0 || c[1] > 0) {
-      double m0[2] = {0, 0};
-      const double v = planes[q].shear(p.x, phi[q], n), b = planes[q].moment(phi[q], n);
-      for (int s = 0; s < n; ++s) m0[s] = Bending::at(b, v, p.x[s], planes[q].sign);
-      const double cross = planes[q].bending_stiffness + p.x[0] * p.x[1] * planes[q].shear_stiffness;
-      const double s11 = 1 + station_stiffness[q][0] * c[0], s22 = n > 1 ? 1 + station_stiffness[q][1] * c[1] : 1;
-      const double s12 = n > 1 ? cross * c[1] : 0, s21 = n > 1 ? cross * c[0] : 0;
-      const double determinant = s11 * s22 - s12 * s21;
-      phi[q][0] += c[0] * (m0[0] * s22 - m0[1] * s12) / determinant;
-      if (n > 1) phi[q][1] += c[1] * (m0[1] * s11 - m0[0] * s21) / determinant;
-    }
+    if (n > 1) cross[q] = planes[q].bending_stiffness + p.x[0] * p.x[1] * planes[q].shear_stiffness;
+    spring_back(q);
     force[shear_of(q)] = planes[q].shear(p.x, phi[q], n);
     force[bend_of(q)] = planes[q].moment(phi[q], n);
     for (int s = 0; s < n; ++s) m[q][s] = Bending::at(force[bend_of(q)], force[shear_of(q)], p.x[s], planes[q].sign);
   }
+
+  /// Adds to plastic rotations those of cracks and damage, which are flexibility at the stations: (1 + S C) m = m0, two
+  /// by two at most.
+  void spring_back(int q) {
+    double c[2] = {0, 0};
+    for (int s = 0; s < n; ++s) c[s] = z.station[s].soft[q];
+    if (!(c[0] > 0 || c[1] > 0)) return;
+    double m0[2] = {0, 0};
+    const double v = planes[q].shear(p.x, phi[q], n), b = planes[q].moment(phi[q], n);
+    for (int s = 0; s < n; ++s) m0[s] = Bending::at(b, v, p.x[s], planes[q].sign);
+    const double s11 = 1 + station_stiffness[q][0] * c[0], s22 = n > 1 ? 1 + station_stiffness[q][1] * c[1] : 1;
+    const double s12 = cross[q] * c[1], s21 = cross[q] * c[0];
+    const double determinant = s11 * s22 - s12 * s21;
+    phi[q][0] += c[0] * (m0[0] * s22 - m0[1] * s12) / determinant;
+    if (n > 1) phi[q][1] += c[1] * (m0[1] * s11 - m0[0] * s21) / determinant;
+  }
+
+  /// What a station that does not turn loses of its moment where the other one turns, for its rotation [N·m/rad].
+  double calc_carried(int q, int s) const { return cross[q] / (1 + station_stiffness[q][s] * z.station[s].soft[q]); }
 
   /// Stored in the springs and in what damage softened [J].
   double calc_energy() const {
@@ -486,13 +494,21 @@ struct Evaluation {
     return find_return(m[0][s], m[1][s], most[0][s], most[1][s], limits.law().biaxial_exponent, scale);
   }
 
-  /// Turns a station alone until its moments are this share of what they are; true if the other one can feel it.
+  /// Turns a station alone until its moments are this share of what they are, while the other one turns on its cracks
+  /// and damage; true if that one can feel it.
   bool turn(int s, const double scale[2]) {
     bool far = false;
+    const int other = 1 - s;
     for (int q = first; q <= last; ++q) {
-      const double by = station_stiffness[q][s] > 0 ? m[q][s] * (1 - scale[q]) / station_stiffness[q][s] : 0;
+      const double soft = n > 1 ? z.station[other].soft[q] : 0, carried = n > 1 ? calc_carried(q, other) : 0;
+      const double stiffness = station_stiffness[q][s] - cross[q] * carried * soft;
+      const double by = station_stiffness[q][s] > 0 ? m[q][s] * (1 - scale[q]) / stiffness : 0;
       phi[q][s] += by;
       m[q][s] *= scale[q];
+      if (n > 1) {
+        phi[q][other] -= soft * carried * by;
+        m[q][other] -= carried * by;
+      }
       if (by != 0) turned[s] = true;
       far = far || std::abs(by) > 1e-9 * std::abs(phi[q][s]);
     }
@@ -520,8 +536,33 @@ struct Evaluation {
         if (!(p.cracking[q].flexibility > 0)) continue;
         grow = grow || std::abs(m[q][s]) > cracks_of(p, z, s, q, ahead).calc_bound(m[q][s]);
       }
-      if (grow) crack_plane(q, {cracks_of(p, z, 0, q, ahead), cracks_of(p, z, n - 1, q, ahead)});
+      if (grow) {
+        double plastic[2] = {0, 0};
+        for (int s = 0; s < n; ++s) plastic[s] = z.station[s].phi[q];
+        (void)crack_plane(q, plastic, {cracks_of(p, z, 0, q, ahead), cracks_of(p, z, n - 1, q, ahead)});
+      }
     }
+  }
+
+  /// Under dead load a station that turns may load the other one beyond what its cracks are known from. True if they
+  /// have grown; then moments are those without the turn again.
+  bool crack_behind_turns() {
+    bool grown = false;
+    for (int q = first; q <= last; ++q) {
+      if (!(p.cracking[q].flexibility > 0)) continue;
+      const std::array<Cracks, 2> cracks{cracks_of(p, z, 0, q, kCracksAhead), cracks_of(p, z, n - 1, q, kCracksAhead)};
+      bool grow = false;
+      double plastic[2] = {0, 0};
+      for (int s = 0; s < n; ++s) {
+        plastic[s] = phi[q][s] - z.station[s].soft[q] * m[q][s];
+        grow = grow || std::abs(m[q][s]) > cracks[static_cast<size_t>(s)].calc_bound(m[q][s]);
+      }
+      if (grow) grown = crack_plane(q, plastic, cracks) || grown;
+    }
+    if (!grown) return false;
+    for (int q = first; q <= last; ++q) find_trial(q);
+    turned[0] = turned[1] = false;
+    return true;
   }
 
   /// The same from outside, in motion. False if nothing has grown.
@@ -532,15 +573,16 @@ struct Evaluation {
     return cracked;
   }
 
-  /// m + S φ(m) = m of the plastic rotations alone, where φ(m) is straight in pieces.
-  void crack_plane(int q, const std::array<Cracks, 2>& cracks) {
-    double plastic[2] = {0, 0}, m0[2] = {0, 0}, other[2] = {0, 0};
-    for (int s = 0; s < n; ++s) plastic[s] = z.station[s].phi[q];
+  /// m + S φ(m) = m of the plastic rotations alone, where φ(m) is straight in pieces. False if no crack has grown.
+  ///   plastic  of the stations, where they have turned in this evaluation too, with what cracks have at no moment
+  bool crack_plane(int q, const double plastic[2], const std::array<Cracks, 2>& cracks) {
+    double m0[2] = {0, 0}, other[2] = {0, 0};
+    bool grown = false;
     for (int s = 0; s < n; ++s) {
       m0[s] = Bending::at(planes[q].moment(plastic, n), planes[q].shear(p.x, plastic, n), p.x[s], planes[q].sign);
       other[s] = z.station[s].soft[q] - z.station[s].crack[q];
     }
-    const double s12 = n > 1 ? planes[q].bending_stiffness + p.x[0] * p.x[1] * planes[q].shear_stiffness : 0;
+    const double s12 = cross[q];
     const double s11 = station_stiffness[q][0], s22 = n > 1 ? station_stiffness[q][1] : 0;
     // each station by itself with the other one as it is finds the pieces, both together then the moments
     Cracks::Piece piece[2];
@@ -576,9 +618,10 @@ struct Evaluation {
       st.bow[q] = line.bow;
       st.crack[q] = line.flexibility;
       st.soft[q] = other[s] + st.crack[q];
-      cracked = true;
+      grown = cracked = true;
     }
-    find_trial(q);
+    if (grown) find_trial(q);
+    return grown;
   }
 
   /// Rotation of a station beyond that of its cracks.
@@ -591,14 +634,20 @@ struct Evaluation {
   ///   peak  not less than limits at any rotation [q][s]
   void turn_onto_law(const Limits& limits, int s, double axial, double integrity, const MomentLimit (&peak)[2][2]) {
     StationState ahead = z.station[s];
-    for (int q = first; q <= last; ++q) phi[q][s] = phi_trial[q][s];
-    turned[s] = false;
-    measure(s);
-    double start[2] = {0, 0}, scale[2];
-    for (int q = first; q <= last; ++q) start[q] = m[q][s];
+    double start[2][2] = {}, moment[2][2] = {}, scale[2];  // [q][s]
+    for (int q = first; q <= last; ++q) {
+      for (int i = 0; i < n; ++i) phi[q][i] -= z.station[i].soft[q] * m[q][i];
+      phi[q][s] = z.station[s].phi[q];
+      spring_back(q);
+      for (int i = 0; i < n; ++i) start[q][i] = phi[q][i];
+    }
+    for (int i = 0; i < n; ++i) measure(i);
+    for (int q = first; q <= last; ++q)
+      for (int i = 0; i < n; ++i) moment[q][i] = m[q][i];
     // rotation that the station comes to under the limits that are set
     const auto turn_to_limits = [&] {
-      for (int q = first; q <= last; ++q) phi[q][s] = phi_trial[q][s], m[q][s] = start[q];
+      for (int q = first; q <= last; ++q)
+        for (int i = 0; i < n; ++i) phi[q][i] = start[q][i], m[q][i] = moment[q][i];
       turned[s] = false;
       if (!is_outside(limits, s, scale)) return z.station[s].strained;
       (void)turn(s, scale);
@@ -690,8 +739,7 @@ struct Evaluation {
   bool turn_both(const double scale[2][2]) {
     double target[2][2], by[2][2];  // [q][s]
     for (int q = first; q <= last; ++q) {
-      const double s12 = planes[q].bending_stiffness + p.x[0] * p.x[1] * planes[q].shear_stiffness;
-      const double s11 = station_stiffness[q][0], s22 = station_stiffness[q][1];
+      const double s12 = cross[q], s11 = station_stiffness[q][0], s22 = station_stiffness[q][1];
       const double determinant = s11 * s22 - s12 * s12;
       if (!(determinant > 1e-9 * s11 * s22)) return false;
       for (int s = 0; s < 2; ++s) target[q][s] = (turned[s] ? m_trial[q][s] : m[q][s]) * scale[s][q];
@@ -700,8 +748,9 @@ struct Evaluation {
       by[q][1] = (s11 * over1 - s12 * over0) / determinant;
     }
     for (int s = 0; s < 2; ++s) {
-      double work = 0;
-      for (int q = first; q <= last; ++q) work += target[q][s] * by[q][s];
+      double work = 0;  // of what is plastic: cracks and damage spring back
+      for (int q = first; q <= last; ++q)
+        work += target[q][s] * (by[q][s] + z.station[s].soft[q] * (m_trial[q][s] - target[q][s]));
       if (!(work >= 0)) return false;
     }
     for (int q = first; q <= last; ++q)
@@ -834,7 +883,7 @@ struct Evaluation {
         m[q][s] = Bending::at(force[bend_of(q)], force[shear_of(q)], p.x[s], planes[q].sign);
         const double added = phi[q][s] - st.phi[q] - st.soft[q] * m[q][s];
         const double share = laws[s]->damage_share;
-        if (share > 0 && added * m[q][s] > 0) {
+        if (turned[s] && share > 0 && added * m[q][s] > 0) {
           const double top = std::min(st.crack[q] + share * std::abs(beyond_cracks(phi, m, q, s)) / std::abs(m[q][s]),
                                       kMostDamage / station_stiffness[q][s]);
           st.soft[q] = std::max(st.soft[q], std::min(top, st.soft[q] + share * added / m[q][s]));
@@ -944,6 +993,9 @@ struct Evaluation {
     const double axial = integrity > 0 ? force[0] / integrity : 0;
     for (int s = 0; s < n; ++s) find_limits(limits[s], s, axial, integrity, z.station[s]);
     turn_stations(limits, axial, integrity);
+    constexpr int most_rounds = 60;  // of turns and the cracks that they bring
+    for (int i = 0; p.is_at_rest && n > 1 && i < most_rounds && crack_behind_turns(); ++i)
+      turn_stations(limits, axial, integrity);
     const double elongation = lengthen(limits, axial);
     for (int s = 0; s < n; ++s) {
       StationState& st = z.station[s];

@@ -242,5 +242,36 @@ TEST(YieldAtRest, ABeamBearsWhatLimitAnalysisGives) {
   EXPECT_FALSE(none.find_equilibrium(message));
 }
 
+TEST(YieldAtRest, AStationThatTurnsLoadsTheCracksOfTheOther) {
+  // stations bear 100 and 60 N·m; one yields from 80 on, the other one cracks, and nothing moves when time begins
+  Model m;
+  m.contact.ground = m.contact.bodies = false;
+  m.gravity = {};
+  const LawId hinge = add_law(m, make_law({0, 0.01}, {80, 130}));
+  Body part;
+  part.name = "part", part.mass = 1e3, part.inertia = Mat3::diagonal({100, 100, 100});
+  ZoneElement e;
+  e.name = "member", e.a = kGround, e.b = add_body(m, part);
+  e.translational_stiffness = {2e5, 1e5, 1e5};
+  e.rotational_stiffness = {8e3, 1e4, 1.2e4};
+  e.stations = {{-0.5, hinge}, {0.5, hinge}};
+  e.cracking[0] = {{20, 20}, {120, 120}, 4e-5};
+  add_element(m, e);
+  Load load;
+  load.name = "load", load.body = {0}, load.force = {0, 0, 40}, load.torque = {0, 80, 0};
+  m.loads.push_back(load);
+  Options o;
+  o.duration = 0.3;
+  double fastest = 0, off = 0;
+  o.on_frame = [&](const View& v) {
+    fastest = std::max({fastest, norm(v.v_WB[0]), norm(v.w_WB[0])});
+    off = std::max({off, std::abs(v.element_moment[0].y + 80), std::abs(v.element_force[0].z + 40)});
+  };
+  const Summary s = run(m, o);
+  EXPECT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+  EXPECT_LT(fastest, 1e-9);
+  EXPECT_LT(off, 0.1);  // it has turned by a hundredth of a radian, and its axes with it
+}
+
 }  // namespace
 }  // namespace topple::mbs

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "models.h"
 
@@ -488,6 +489,65 @@ TEST(Zone, TwoStationsOfAMemberYieldAtItsEnds) {
   EXPECT_NEAR(w.z.station[0].phi[1], -w.z.station[1].phi[1], 1e-5);  // one step is 2e-6
   EXPECT_NEAR(w.z.resultant.c[5], 0, 1e-3 * 108e3);                  // no moment at mid-length
   EXPECT_NEAR(w.z.energy + w.z.plastic, w.work, 2e-3 * w.work);
+}
+
+TEST(Zone, AStationThatDoesNotTurnSpringsBack) {
+  // one station is damaged and unloaded, then the other one turns alone: what is left of the first one's rotation stays
+  ZoneLaw weak = make_law(), strong = make_law();
+  weak.damage_share = strong.damage_share = 0.4;
+  for (ZoneLaw* law : {&weak, &strong}) law->shear_y = law->shear_z = kUnlimited;
+  for (MomentFamily* f : {&strong.moment_y, &strong.moment_z})
+    for (std::vector<double>* row : {&f->positive, &f->negative})
+      for (double& v : *row) v *= 3;
+  Walk w(strong, test::make_member(1));
+  w.laws.push_back(compile_law(weak));
+  const double k = w.p.stiffness[5], shear = w.p.stiffness[1], half = 0.5 * test::kMemberLength;
+  w.go({{0, -half * 0.01, 0, 0, 0, 110e3 / k + 0.01}});
+  ASSERT_GT(w.z.station[1].soft[1], 0);
+  ASSERT_EQ(w.z.station[0].phi[1], 0);
+  const double left = w.z.station[1].phi[1];
+  w.go({{0, -half * left, 0, 0, 0, left}});
+  EXPECT_NEAR(w.z.resultant.c[5], 0, 1);
+  const StationState damaged = w.z.station[1];
+  // from 300 kN·m on at the first station, with 20 to 80 at the other one
+  double most = 0;
+  for (const double plastic : {0.0, 0.001, 0.002, 0.003}) {
+    w.go({{0, 110e3 / half / shear + half * (plastic - left), 0, 0, 0, left + 190e3 / k + plastic}});
+    most = std::max(most, std::abs(w.z.resultant.c[5] - half * w.z.resultant.c[1]));
+  }
+  EXPECT_GT(most, 20e3);
+  EXPECT_LT(most, 90e3);
+  EXPECT_GT(w.z.station[0].phi[1], 1e-4);
+  EXPECT_EQ(w.z.station[1].soft[1], damaged.soft[1]);
+  EXPECT_NEAR(w.z.station[1].phi[1], damaged.phi[1], 1e-12);
+}
+
+TEST(Zone, NeverGivesBackWhatWasDissipated) {
+  // random walks of two stations, damaged to different shares
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> even(-1, 1);
+  for (const double first : {0.0, 0.3, 0.9})
+    for (const double second : {0.0, 0.3, 0.9})
+      for (int walk = 0; walk < 4; ++walk) {
+        ZoneLaw laws[2] = {test::plastic_hinge(100e3), test::plastic_hinge(100e3)};
+        laws[0].damage_share = first, laws[1].damage_share = second;
+        Walk w(laws[0], test::make_member(1));
+        w.laws.push_back(compile_law(laws[1]));
+        double most = 0, fall = 0;
+        for (int leg = 0; leg < 8; ++leg) {
+          const Six from = w.before;
+          Six to;
+          to.c[1] = 0.02 * even(random), to.c[5] = 0.02 * even(random);
+          for (int i = 1; i <= 200; ++i) {
+            Six at = from;
+            for (int c : {1, 5}) at.c[c] += (to.c[c] - from.c[c]) * i / 200;
+            w.go(at, 1);
+            most = std::max(most, w.z.plastic), fall = std::max(fall, most - w.z.plastic);
+          }
+        }
+        EXPECT_GT(most, 100);
+        EXPECT_LT(fall, 1e-9 * most) << first << " " << second << " " << walk;
+      }
 }
 
 TEST(Zone, AChargeTakesTheLimitsAwayWithinItsRamp) {
