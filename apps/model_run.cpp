@@ -77,8 +77,8 @@ void print_summary(std::FILE* out, const mbs::Model& m, const mbs::Summary& s, c
                                                  s.equilibrium_iterations, s.equilibrium_residual));
   if (s.ending == mbs::Summary::Ending::NoEquilibrium) {
     rows.emplace_back("Hint",
-                      "a mechanism has no equilibrium: --no-equilibrium, or \"run\": {\"equilibrium\": false} in the "
-                      "file, begins with the poses and velocities given");
+                      "a mechanism has none, nor what breaks under its loads: --no-equilibrium, or \"run\": "
+                      "{\"equilibrium\": false} in the file, begins with the poses and velocities given");
   } else {
     const std::string step =
         !(s.step > 0) ? "the engine's choice"

@@ -140,7 +140,8 @@ bool Course::start(double step, bool ends_on_instants) {
   must_rebuild_ = false;  // nothing is built yet
   forces_.start(motion_);
   total_at_start_ = 0;
-  total_at_start_ = calc_energy().residual;
+  const mbs::Energy e = calc_energy();
+  total_at_start_ = e.residual, stored_at_start_ = e.elastic;
   begin_ = std::chrono::steady_clock::now();
   return true;
 }
@@ -453,7 +454,7 @@ mbs::Energy Course::calc_energy() const {
   e.removed = removed_ + in.removed;
   e.residual = e.kinetic + e.gravity + e.elastic + e.plastic + e.damping + e.contact_loss + e.removed - e.loads -
                total_at_start_;
-  e.released = std::max(released_, -e.gravity - e.removed + e.loads);
+  e.released = std::max(released_, -e.gravity - e.removed + e.loads + std::max(0.0, stored_at_start_ - e.elastic));
   return e;
 }
 

@@ -135,7 +135,8 @@ class Course {
   long frame_ = 0;
   bool ends_on_instants_ = false, is_started_ = false, is_over_ = false, must_rebuild_ = false,
        needs_reactions_ = false, is_viewed_ = false;
-  double removed_ = 0, gravity_at_start_ = 0, total_at_start_ = 0, released_ = 0, largest_residual_ = 0;  // [J]
+  double removed_ = 0, gravity_at_start_ = 0, total_at_start_ = 0, stored_at_start_ = 0, released_ = 0,
+         largest_residual_ = 0;  // [J]
   std::chrono::steady_clock::time_point begin_;
 };
 

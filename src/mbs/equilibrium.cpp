@@ -601,9 +601,13 @@ class DeadLoad {
   double calc_weight() const;
   /// Of the stiffness with joints held by the penalty. False: a mechanism.
   bool factorise(std::string& message);
+  /// What reactions of joints hold bodies with that turn, where it holds: a body that hangs swings back.
+  void add_hanging(Triplets&) const;
   /// Evaluates all forces where the bodies are now; multipliers and joints' forces follow their gaps.
   void find_unbalanced();
   void move(const Vector& by);
+  /// Shortens a way on which a body would turn by more than most_turn_.
+  void shorten(Vector& way) const;
   /// Of free bodies, and the joints' multipliers.
   struct Place {
     std::vector<Vec3> p;
@@ -634,7 +638,9 @@ class DeadLoad {
   const Unknowns& u_;
   const std::vector<ZoneState> virgin_, virgin_rotational_;
   double weight_ = 1, penalty_ = 1;
-  double share_ = 1;  // of an iteration's way that is gone
+  double share_ = 1;               // of an iteration's way that is gone
+  double most_turn_ = kUnlimited;  // of a body in an iteration [rad]
+  bool hangs_ = false;             // reactions of joints count as stiffness
   const std::shared_ptr<StiffnessFactor> factor_;
   Sparse first_;  // stiffness at the start, once
   Assembly::Flexibility cracks_;
@@ -699,6 +705,7 @@ bool DeadLoad::factorise(std::string& message) {
       const int count = assembly_.joint_rows(j, rows, gap);
       for (int i = 0; i < count; ++i) add_outer(rows[i], penalty_, u_, t);
     }
+    if (hangs_) add_hanging(t);
     Sparse P(n, n);
     P.setFromTriplets(t.begin(), t.end());
     K += P;
@@ -716,6 +723,28 @@ bool DeadLoad::factorise(std::string& message) {
             s_.model.bodies[static_cast<size_t>(assembly_.free_bodies()[static_cast<size_t>(unknown / u_.each)])].name +
             "\" can move without resistance: the model is a mechanism and has no dead-load equilibrium";
   return false;
+}
+
+void DeadLoad::add_hanging(Triplets& out) const {
+  // a force f at the lever r from the mass centre brings (θ x r) x f on a turn θ: as stiff as r·f about r x f, and as
+  // (r·f + |r||f|)/2 about r/|r| - f/|f|; what would push on is left out
+  for (size_t j = 0; j < s_.joints.size(); ++j) {
+    const CompiledJoint& joint = s_.joints[j];
+    const JointFrames frames = calc_joint_frames(s_.state, joint);
+    for (const bool is_child : {false, true}) {
+      const int place = assembly_.place(is_child ? joint.child : joint.parent);
+      if (place < 0) continue;
+      const Vec3 r = is_child ? frames.lever_child : frames.lever_parent;
+      const Vec3 f = (is_child ? 1.0 : -1.0) * s_.state.joint[j].force;
+      const double size = norm(r) * norm(f), along = dot(r, f);
+      if (!(size > 0) || !std::isfinite(size)) continue;
+      const auto add = [&](const Vec3& axis, double k) {
+        if (k > 0 && norm(axis) > 0) add_outer({-1, place, {}, {}, {}, (1 / norm(axis)) * axis}, k, u_, out);
+      };
+      add(cross(r, f), along);
+      add((1 / norm(r)) * r - (1 / norm(f)) * f, 0.5 * (along + size));
+    }
+  }
 }
 
 void DeadLoad::find_unbalanced() {
@@ -781,6 +810,13 @@ void DeadLoad::move(const Vector& by) {
     s_.state.q[b] = normalized(exp_rotation(turned) * s_.state.q[b]);
     s_.state.R[b] = to_matrix(s_.state.q[b]);
   }
+}
+
+void DeadLoad::shorten(Vector& way) const {
+  double most = 0;
+  for (Eigen::Index i = 0; i < way.size(); ++i)
+    if (u_.coordinate(static_cast<int>(i % u_.each)) >= 3) most = std::max(most, std::abs(way[i]));
+  if (most > most_turn_) way *= most_turn_ / most;
 }
 
 DeadLoad::Place DeadLoad::find_place() const {
@@ -915,6 +951,20 @@ bool DeadLoad::find(std::string& message) {
     if (end != End::Diverged) break;
   }
   if (end == End::Found || end == End::Mechanism) return end == End::Found;
+  // what turns far, where nothing has limits: on short turns
+  const bool has_limits = std::any_of(s_.model.elements.begin(), s_.model.elements.end(),
+                                      [](const ZoneElement& e) { return !e.stations.empty(); }) ||
+                          !s_.model.rotational_elements.empty();
+  if (!has_limits) {
+    most_turn_ = 0.2;
+    for (const bool hangs : {true, false})
+      for (const double share : {1.0, 0.3, 0.1, 0.03}) {
+        share_ = share, hangs_ = hangs;
+        begin_again();
+        end = search(good_enough, message);
+        if (end == End::Found) return true;
+      }
+  }
   const auto cracks = [](const auto& x) {
     return x.zone.cracking[0].flexibility > 0 || x.zone.cracking[1].flexibility > 0;
   };
@@ -1023,7 +1073,9 @@ DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
     if (steps == Steps::Accelerated) {
       move_accelerated();
     } else {
-      move(share_ * factor_->solve(pushed_));
+      Vector way = share_ * factor_->solve(pushed_);
+      shorten(way);
+      move(way);
     }
     ++round;
   }

@@ -404,8 +404,9 @@ std::vector<StiffRow> System::calc_spring_stiffness(bool fast, double force_scal
 
 bool System::find_overload(std::string& message) const {
   char words[120];
-  const auto complain = [&](const std::string& what, double f, double strength) {
-    std::snprintf(words, sizeof words, " would carry %.4g N or N·m of its strength of %.4g", std::abs(f), strength);
+  const auto complain = [&](const std::string& what, double f, double strength, const char* unit = "N") {
+    std::snprintf(words, sizeof words, " would carry %.4g %s, more than its strength of %.4g %s", std::abs(f), unit,
+                  strength, unit);
     message = "no dead-load equilibrium: " + what + words;
     return true;
   };
@@ -418,12 +419,14 @@ bool System::find_overload(std::string& message) const {
   for (size_t i = 0; i < forces.torsions.size(); ++i)
     if (const double f = state.torsion[i].component.spring;
         state.torsion[i].live && std::abs(f) > forces.torsions[i].strength)
-      return complain("rotational spring \"" + model.rotational_springs[i].name + "\"", f, forces.torsions[i].strength);
+      return complain("rotational spring \"" + model.rotational_springs[i].name + "\"", f, forces.torsions[i].strength,
+                      "N·m");
   for (size_t i = 0; i < forces.bushings.size(); ++i)
     for (int c = 0; c < 6; ++c)
       if (const double f = state.bushing[i].component[c].spring;
           state.bushing[i].live && std::abs(f) > forces.bushings[i].strength[c])
-        return complain("bushing \"" + model.bushings[i].name + "\"", f, forces.bushings[i].strength[c]);
+        return complain("bushing \"" + model.bushings[i].name + "\"", f, forces.bushings[i].strength[c],
+                        c < 3 ? "N" : "N·m");
   for (size_t i = 0; i < model.cables.size(); ++i)
     if (state.cable[i].live && state.cable[i].force > model.cables[i].strength)
       return complain("cable \"" + model.cables[i].name + "\"", state.cable[i].force, model.cables[i].strength);

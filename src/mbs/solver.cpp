@@ -73,6 +73,7 @@ void System::evaluate_start() {
   state.total_at_start = 0;
   const Energy e = calc_energy();
   state.total_at_start = e.residual;
+  state.stored_at_start = e.elastic + e.contact;
   if (options.tells_lost_contact) note_overlaps_at_start();
 }
 

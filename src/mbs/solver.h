@@ -28,7 +28,7 @@ struct Energy {
   double removed = 0;       // taken away with removed mass and released elements
   double loads = 0;         // work that loads have done on the bodies
   double residual = 0;      // what the balance lacks: the integration error
-  double released = 0;      // potential energy and work of loads set free so far, the reference of the residual
+  double released = 0;      // energy of weight, loads and springs set free so far, the reference of the residual
 };
 
 enum class ElementState : std::uint8_t { Elastic, Yielded, Softening, Broken, Removed };

@@ -807,7 +807,8 @@ Energy System::calc_energy() const {
   e.removed = state.removed;
   e.residual = e.kinetic + e.gravity + e.elastic + e.contact + e.plastic + e.damping + e.friction + e.contact_loss +
                e.removed - e.loads - state.total_at_start;
-  e.released = std::max(state.released, -e.gravity - e.removed + e.loads);
+  const double freed = std::max(0.0, state.stored_at_start - e.elastic - e.contact);
+  e.released = std::max(state.released, -e.gravity - e.removed + e.loads + freed);
   return e;
 }
 

@@ -136,7 +136,7 @@ struct State {
   double removed = 0, contact_energy = 0, stick_energy = 0;
   double contact_loss = 0, contact_loss_power = 0;  // by the dashpots of contacts [J, W]
   double friction_work = 0, friction_power = 0;     // of the friction forces on the bodies [J, W]
-  double total_at_start = 0;
+  double total_at_start = 0, stored_at_start = 0;   // of it in springs and contacts [J]
   double gravity_at_start = 0, largest_residual = 0, released = 0;
   double largest_drift = 0;
   long quiet_steps = 0;

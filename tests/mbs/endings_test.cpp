@@ -247,6 +247,53 @@ TEST(Ending, OfASpringWhoseJointComesOffAtItsLimitTurnsNothing) {
   EXPECT_LT(largest, 0.02);  // gravity makes 9 rad/s² at most
 }
 
+TEST(Ending, OfALatchSetsFreeWhatASpringStoredAtRest) {
+  // 20 J at rest, without weight or loads: half a swing, and the balance is judged by what was set free
+  Model m = make_sprung();
+  m.bodies[0].v_WB = {};
+  m.springs[0].free_length = 0;
+  Joint latch;
+  latch.name = "latch", latch.kind = Joint::Kind::Fixed;
+  latch.parent = kGround, latch.child = {0};
+  latch.X_PF.p = {1, 0, 0};
+  add_joint(m, latch);
+  m.events.push_back(make_event(0.1, Action::Kind::ReleaseJoint));
+  Options o;
+  o.duration = 1, o.step = 1e-3;
+  double fastest = 0;
+  o.on_frame = [&](const View& v) { fastest = std::max(fastest, norm(v.v_WB[0])); };
+  const Summary s = run(m, o);
+  EXPECT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+  EXPECT_NEAR(fastest, kOmega, 0.02 * kOmega);
+  EXPECT_GT(s.energy_error, 0);
+  EXPECT_LT(s.energy_error, 1e-4);
+  o.step = 0.9 * 2 / kOmega;
+  EXPECT_GT(run(m, o).energy_error, 0.1);
+}
+
+TEST(Equilibrium, OfABodyThatHangsOnASoftSpringIsFound) {
+  // k θ = m g l cos θ, from where it sticks out
+  for (const double k : {0.5, 2.0, 8.0, 30.0}) {
+    Model m = make_pendulum();
+    RotationalSpring r;
+    r.name = "spring";
+    r.joint = {0};
+    r.spring.rate = k;
+    m.rotational_springs.push_back(r);
+    Options o;
+    o.duration = 0.1;
+    double lean = 0, fastest = 0;
+    o.on_frame = [&](const View& v) {
+      lean = std::atan2(-v.X_WB[0].p.z, v.X_WB[0].p.x);
+      fastest = std::max(fastest, norm(v.w_WB[0]));
+    };
+    const Summary s = run(m, o);
+    ASSERT_EQ(s.ending, Summary::Ending::TimeLimit) << k << " " << s.message;
+    EXPECT_NEAR(k * lean, 2 * 9.81 * std::cos(lean), 1e-6) << k;
+    EXPECT_LT(fastest, 1e-6) << k;
+  }
+}
+
 TEST(Ending, OfLongAgoIsNow) {
   // the successor of a run has an event before the instant at which it takes over
   const Model m = make_sprung();
