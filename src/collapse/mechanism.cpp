@@ -30,9 +30,16 @@ BlockFrame find_block(const std::vector<BlockFrame>& frames, double time) {
   const BlockFrame& before = *(after - 1);
   const double share = (time - before.time) / (after->time - before.time);
   at.time = time;
-  at.rotation =
-      normalized(exp_rotation(share * log_rotation(after->rotation * conjugate(before.rotation))) * before.rotation);
+  const auto between = [share](const Quat& a, const Quat& b) {
+    return normalized(exp_rotation(share * log_rotation(b * conjugate(a))) * a);
+  };
+  at.rotation = between(before.rotation, after->rotation);
   at.displacement = before.displacement + share * (after->displacement - before.displacement);
+  if (before.pieces.above > 0) {
+    at.pieces.rotation = between(before.pieces.rotation, after->pieces.rotation);
+    at.pieces.displacement =
+        before.pieces.displacement + share * (after->pieces.displacement - before.pieces.displacement);
+  }
   return at;
 }
 
@@ -108,23 +115,26 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   out.run.z = 0;
 
   // the way it leans when it touches down: the planned one, unless it turned more about another axis
-  const Vec3 turned = log_rotation(at.rotation);
+  const bool is_in_pieces = at.connected < k.mechanism_coherent_share;
+  const BlockFrame::Motion whole =
+      is_in_pieces ? at.pieces : BlockFrame::Motion{at.rotation, at.displacement, at.above};
+  const Vec3 turned = log_rotation(whole.rotation);
   Vec3 direction = in.fall_direction;
   const Vec3 lean = cross({turned.x, turned.y, 0}, {0, 0, 1});
   if (norm(lean) > 1e-3) direction = (1 / norm(lean)) * lean;
   out.tilt = norm(Vec3{turned.x, turned.y, 0});
-  const Mat3 R = to_matrix(at.rotation);
-  const auto drop_of = [&](const Vec3& arm) { return -(at.displacement + R * arm - arm).z; };
+  const Mat3 R = to_matrix(whole.rotation);
+  const auto drop_of = [&](const Vec3& arm) { return -(whole.displacement + R * arm - arm).z; };
   const auto share_at = [&](double below) {
     const Vec3 down{0, 0, -below};
     const double front = drop_of(calc_reach(in.outline, direction) * direction + down);
     const double rear = drop_of(-calc_reach(in.outline, -direction) * direction + down);
     return front > 1e-3 ? std::max(0.0, rear) / front : 1;
   };
-  out.drop = -at.displacement.z;
+  out.drop = -whole.displacement.z;
   out.connected = at.connected;
   out.rear_share = share_at(0);
-  out.foot_share = share_at(std::max(0.0, at.above - in.foot));
+  out.foot_share = share_at(std::max(0.0, whole.above - in.foot));
   // a slender block that turns about its foot lowers both edges alike at its mass centre
   const bool drops = out.rear_share >= k.mechanism_topple_rear_share && out.tilt < k.mechanism_topple_rotation;
   const bool turns_about_foot = drops && out.foot_share < k.mechanism_topple_rear_share;
@@ -183,7 +193,12 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.name = "fold";
     out.text = fmt::format("It folds: {:.0f} % of the upper mass turns forward, {:.0f} % backward; {}.",
                            100 * at.forward, 100 * at.backward, motion);
-  } else if (at.connected < k.mechanism_coherent_share && at.moved < k.mechanism_together_share) {
+  } else if (at.left >= k.mechanism_fold_share && at.right >= k.mechanism_fold_share) {
+    out.name = "fold";
+    out.text =
+        fmt::format("It folds: {:.0f} % of the upper mass turns to one side of the fall, {:.0f} % to the other; {}.",
+                    100 * at.left, 100 * at.right, motion);
+  } else if (is_in_pieces && at.moved < k.mechanism_together_share) {
     out.name = "progressive";
     out.text = fmt::format("Progressive collapse: the largest connected part holds {:.0f} % of the upper mass; {}.",
                            100 * at.connected, motion);
@@ -198,9 +213,10 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.name = "topple";
     out.text = fmt::format("It topples: {}.", motion);
   }
-  if (at.connected < k.mechanism_coherent_share && (drops || out.name == "topple" || out.name == "wrong direction"))
-    out.text += fmt::format(" These numbers are of its largest connected part, {:.0f} % of the upper mass.",
-                            100 * at.connected);
+  if (is_in_pieces && out.name != "stands" && out.name != "partial" && out.name != "progressive")
+    out.text +=
+        fmt::format(" It is in pieces then, the largest of {:.0f} % of the upper mass: these numbers are of all.",
+                    100 * at.connected);
   if (turns_about_foot && (out.name == "topple" || out.name == "wrong direction"))
     out.text += fmt::format(
         " At its foot the rear edge has come down {:.0f} % as far as the front edge: it turns about its foot.",

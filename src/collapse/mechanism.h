@@ -14,15 +14,25 @@ namespace topple::collapse {
 /// Motion of a structure's upper block at one frame. The block is the largest group of upper bodies that are still
 /// connected.
 struct BlockFrame {
+  /// Of what belongs together, since the start.
+  struct Motion {
+    Quat rotation;      // mass-weighted mean
+    Vec3 displacement;  // of the mass centre [m]
+    double above = 0;   // height of the mass centre at the start [m]
+  };
+
   double time = 0;       // [s]
-  Quat rotation;         // mass-weighted mean rotation of the block since the start
-  Vec3 displacement;     // of the block's mass centre since the start [m]
-  double above = 0;      // height of the block's mass centre at the start [m]
+  Quat rotation;         // as Motion has it, of the block
+  Vec3 displacement;     //
+  double above = 0;      //
+  Motion pieces;         // of all upper bodies, where the block holds less than mechanism.coherent_share of their mass
   double connected = 1;  // mass of the block over the mass of all upper bodies
   double moved = 0;      // share of all moving mass of the structure that has gone farther than it may, to any side
   double down = 0;       // share of it that has come down
   double forward = 0;    // share of the upper mass that turned by more than mechanism.fold_rotation about the axis
   double backward = 0;   // the same against it
+  double left = 0;       // the same about the horizontal axis across it, to the left of the fall
+  double right = 0;      // and to its right
   double height = 0;     // of the mass centre of all moving mass of the structure [m]
   Vec3 centre;           // that mass centre [m]
   double fastest = 0;    // largest speed of an upper body [m/s]

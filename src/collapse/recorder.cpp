@@ -227,6 +227,9 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
     const double turn = calc_tilt(v.X_WB[b].q * conjugate(start_[b].q), map_.fall_direction);
     if (turn > k_.mechanism_fold_rotation) f.forward += m;
     if (turn < -k_.mechanism_fold_rotation) f.backward += m;
+    const double aside = calc_tilt(v.X_WB[b].q * conjugate(start_[b].q), cross({0, 0, 1}, map_.fall_direction));
+    if (aside > k_.mechanism_fold_rotation) f.left += m;
+    if (aside < -k_.mechanism_fold_rotation) f.right += m;
     f.fastest = std::max(f.fastest, norm(v.v_WB[b]));
   }
   for (size_t s = 0; s < S; ++s) {
@@ -242,24 +245,36 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
     if (!(upper[s] > 0)) continue;
     f.forward = f.forward / upper[s];
     f.backward = f.backward / upper[s];
+    f.left = f.left / upper[s];
+    f.right = f.right / upper[s];
     size_t largest = B;
     for (size_t b = 0; b < B; ++b)
       if (group[b] > 0 && map_.bodies[b].structure == static_cast<int>(s) &&
           (largest == B || group[b] > group[largest]))
         largest = b;
     f.connected = group[largest] / upper[s];
-    std::vector<FitBody> block;
-    Vec3 shift;
-    double above = 0;
-    for (size_t b = 0; b < B; ++b) {
-      if (!is_upper(static_cast<int>(b)) || linked.find(static_cast<int>(b)) != static_cast<int>(largest)) continue;
-      block.push_back({v.mass[b], model_.bodies[b].inertia, start_[b], v.X_WB[b]});
-      shift += v.mass[b] * (centre_of(b) - start_of(b));
-      above += v.mass[b] * start_of(b).z;
-    }
-    f.rotation = fit_rotation(block);
-    f.displacement = (1 / group[largest]) * shift;
-    f.above = above / group[largest];
+    const auto find_motion = [&](double mass, auto belongs) {
+      std::vector<FitBody> bodies;
+      BlockFrame::Motion motion;
+      for (size_t b = 0; b < B; ++b) {
+        if (!is_upper(static_cast<int>(b)) || !belongs(static_cast<int>(b))) continue;
+        bodies.push_back({v.mass[b], model_.bodies[b].inertia, start_[b], v.X_WB[b]});
+        motion.displacement += v.mass[b] * (centre_of(b) - start_of(b));
+        motion.above += v.mass[b] * start_of(b).z;
+      }
+      motion.rotation = fit_rotation(bodies);
+      motion.displacement *= 1 / mass;
+      motion.above /= mass;
+      return motion;
+    };
+    const BlockFrame::Motion block =
+        find_motion(group[largest], [&](int b) { return linked.find(b) == static_cast<int>(largest); });
+    f.rotation = block.rotation, f.displacement = block.displacement, f.above = block.above;
+    if (f.connected < k_.mechanism_coherent_share)
+      f.pieces = find_motion(upper[s], [&](int b) {
+        return map_.bodies[static_cast<size_t>(b)].structure == static_cast<int>(s) &&
+               v.mass[static_cast<size_t>(b)] > 0;
+      });
   }
   return out;
 }

@@ -50,14 +50,40 @@ TEST(Mechanism, ComingDownWithoutTurningIsVertical) {
   EXPECT_TRUE(std::isnan(m.azimuth));
 }
 
-TEST(Mechanism, TellsHowMuchTheNumbersOfABrokenBlockAreOf) {
+/// Its largest part holds so much of the upper mass; all of it moves as the block does.
+void take_apart(BlockFrame& f, double connected) {
+  f.connected = connected;
+  f.pieces = {f.rotation, f.displacement, f.above};
+}
+
+TEST(Mechanism, WhatIsInPiecesIsJudgedByAllOfThem) {
   MechanismInput in = synthetic(0.2, 0, 1);
-  EXPECT_THAT(judge_mechanism(in, default_knowledge()).text,
-              testing::Not(testing::HasSubstr("largest connected part")));
-  for (BlockFrame& f : in.frames) f.connected = 0.3, f.moved = 1;
+  EXPECT_THAT(judge_mechanism(in, default_knowledge()).text, testing::Not(testing::HasSubstr("in pieces")));
+  // the largest one comes straight down, and all together lean
+  const MechanismInput drops = synthetic(0, 2.4, 1);
+  for (size_t i = 0; i < in.frames.size(); ++i) {
+    BlockFrame& f = in.frames[i];
+    take_apart(f, 0.3);
+    f.moved = 1;
+    f.rotation = drops.frames[i].rotation, f.displacement = drops.frames[i].displacement;
+  }
   const Mechanism m = judge_mechanism(in, default_knowledge());
   EXPECT_EQ(m.name, "topple");
-  EXPECT_THAT(m.text, testing::HasSubstr("These numbers are of its largest connected part, 30 % of the upper mass."));
+  EXPECT_NEAR(m.tilt, 0.2, 1e-12);
+  EXPECT_THAT(m.text, testing::HasSubstr("in pieces then, the largest of 30 % of the upper mass"));
+  for (BlockFrame& f : in.frames) f.connected = 0.6;
+  EXPECT_EQ(name_of(in), "vertical");
+}
+
+TEST(Mechanism, FoldsAboutEitherAxis) {
+  MechanismInput in = synthetic(0.1, 1, 1);
+  EXPECT_NE(name_of(in), "fold");
+  for (BlockFrame& f : in.frames) f.left = 0.3, f.right = 0.1;
+  EXPECT_NE(name_of(in), "fold");
+  for (BlockFrame& f : in.frames) f.right = 0.25;
+  const Mechanism m = judge_mechanism(in, default_knowledge());
+  EXPECT_EQ(m.name, "fold");
+  EXPECT_THAT(m.text, testing::HasSubstr("30 % of the upper mass turns to one side of the fall, 25 % to the other"));
 }
 
 TEST(Mechanism, AToleranceOfZeroIsOne) {
@@ -114,7 +140,8 @@ TEST(Mechanism, TellsWhichOtherVerdictIsNear) {
 
   // it breaks up behind its touchdown
   BlockFrame f = in.frames[1];
-  f.time = 1.05, f.connected = 0.4, f.moved = 0.3;
+  f.time = 1.05, f.moved = 0.3;
+  take_apart(f, 0.4);
   in.frames.insert(in.frames.begin() + 2, f);
   std::vector<NearVerdict> near = find_near_verdicts(in, k);
   ASSERT_EQ(near.size(), 1U);
@@ -305,7 +332,7 @@ TEST(Mechanism, TwoPartsTurningAgainstEachOtherFold) {
 
 TEST(Mechanism, ABlockInPiecesIsProgressive) {
   MechanismInput in = synthetic(0.2, 0, 1);
-  for (BlockFrame& f : in.frames) f.connected = 0.3;
+  for (BlockFrame& f : in.frames) take_apart(f, 0.3);
   EXPECT_EQ(name_of(in), "progressive");
 }
 
