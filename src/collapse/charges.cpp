@@ -124,10 +124,12 @@ std::string tell_stage(const product::Stage& stage, size_t number) {
 
 void Builder::add_events(std::vector<Firing> schedule) {
   constexpr const char* between_gaps = "Piece between two gaps";
+  constexpr const char* without_hold = "Cable without hold";
   map.schedule = std::move(schedule);
   map.remarks.clear();
   // events may be added anew
-  std::erase_if(map.notes, [](const ModelNote& note) { return note.title == between_gaps; });
+  std::erase_if(map.notes,
+                [](const ModelNote& note) { return note.title == between_gaps || note.title == without_hold; });
   if (const std::string text = tell_pieces_between_gaps(plan); !text.empty()) map.notes.push_back({between_gaps, text});
   for (size_t s = 0; s < plan.stages.size(); ++s) map.stages.push_back(tell_stage(plan.stages[s], s + 1));
   std::vector<Assembly> current = assemblies;  // as they are after the events so far
@@ -136,6 +138,7 @@ void Builder::add_events(std::vector<Firing> schedule) {
   std::set<std::string> without_zone;             // members with damage beside a charge that no zone has
   std::map<int, const product::Charge*> weakest;  // element -> charge so far that leaves least of it
   std::map<int, double> highest;                  // column -> upper end of what charges so far destroyed [m]
+  std::set<size_t> loose_cables;                  // tied to what charges so far destroyed
   const std::vector<Firing> firings = order_firings();
   // a higher charge makes the stub if it fires in the same instant
   const auto is_highest = [&](const Firing& f) {
@@ -213,6 +216,20 @@ void Builder::add_events(std::vector<Firing> schedule) {
     // the destroyed length is thrown out, and with it what it cuts off from the part of a column above it
     const int below = stump_body.count(c.member) ? stump_body.at(c.member) : -1;
     const double loose_from = below < 0 ? from : std::min(from, m.start.z + lowest_charge.at(c.member));
+    for (size_t i = 0; i < std::min(plan.cables.size(), model.cables.size()); ++i) {
+      const product::Cable& cable = plan.cables[i];
+      const double at = m.start[axis] + cable.position;
+      if (cable.member != c.member || (is_shaft && !product::is_all_around(c.opening))) continue;
+      if (at < (model.cables[i].a.index == below ? from : loose_from) || at > to) continue;
+      if (!loose_cables.insert(i).second) continue;
+      mbs::Action act;
+      act.kind = mbs::Action::Kind::ReleaseCable;
+      act.cable = static_cast<int>(i);
+      lighter.actions.push_back(std::move(act));
+      map.notes.push_back(
+          {without_hold, fmt::format("{} lets go at {:.2f} s: what it is tied to on {} is destroyed then.", cable.name,
+                                     lighter.time, m.name)});
+    }
     std::set<int> touched;
     for (size_t b = 0; b < current.size(); ++b)
       for (const Part& p : current[b].parts)

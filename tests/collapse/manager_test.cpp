@@ -686,6 +686,32 @@ TEST(Manager, SpansBearWhatThreeHingesBear) {
   EXPECT_EQ(walled.count("B-A1B1-0"), 1u) << "it stands below";
 }
 
+TEST(Manager, CablesLetGoOfWhatIsDestroyed) {
+  // 0.5 to 1.5 m of a column are thrown out; what stands below and above holds its cable
+  const auto released = [](const std::string& position, const std::string& member = "C-A1-0") {
+    const Built b =
+        build(read(portal(charge("C-A1-0", "0.2 s", "scatter = \"0 s\"") + "[[cable]]\nname = \"pull\"\nmember = \"" +
+                          member + "\"\nposition = \"" + position +
+                          "\"\nanchor = [\"-20 m\", \"0 m\", \"0 m\"]\nstiffness = \"1 MN/m\"\nstrength = \"1 MN\"\n")),
+              without_limit());
+    double at = -1;
+    for (const mbs::Event& e : b.model.events)
+      for (const mbs::Action& a : e.actions)
+        if (a.kind == mbs::Action::Kind::ReleaseCable && a.cable == 0) at = e.time;
+    const bool is_told = std::any_of(b.map.notes.begin(), b.map.notes.end(), [](const ModelNote& n) {
+      return n.text.find("pull lets go at 0.20 s: what it is tied to on C-A1-0") != std::string::npos;
+    });
+    EXPECT_EQ(is_told, at >= 0) << position;
+    return at;
+  };
+  const double gone = 0.2 + default_knowledge().charge_release_time;
+  EXPECT_NEAR(released("1 m"), gone, 1e-12);
+  EXPECT_NEAR(released("1.45 m"), gone, 1e-12);
+  EXPECT_EQ(released("0.2 m"), -1);
+  EXPECT_EQ(released("1.6 m"), -1);
+  EXPECT_EQ(released("1 m", "C-B1-0"), -1);
+}
+
 TEST(Manager, WhatWasTakenOutCoversNoMember) {
   const std::string frame = materials() + grid("A = \"0 m\", B = \"5 m\"", "1 = \"0 m\", 2 = \"4 m\"", 1) +
                             "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n";
