@@ -123,6 +123,24 @@ void ask_for_drivers(const Problem& p, const Budget& b, uncertainty::Asker& aske
     asker.ask(make_spread_points(p, b));
 }
 
+namespace {
+
+/// Of inputs that are free of each other one explains at least what no other one has a part in. Bins do not see what is
+/// narrower than they are.
+void raise_to_bound(std::vector<uncertainty::Driver>& all) {
+  for (uncertainty::Driver& d : all) {
+    double others = 0, squares = 0;
+    for (const uncertainty::Driver& o : all)
+      if (&o != &d) others += o.total, squares += o.total_error * o.total_error;
+    const double bound = 1 - others, error = std::sqrt(squares);
+    const bool may_be = bound - 2 * error <= d.total + 2 * d.total_error;
+    if (may_be && bound - 2 * error > d.first + 2 * d.first_error)
+      d.first = std::min(bound, 1.0), d.first_error = error;
+  }
+}
+
+}  // namespace
+
 void read_drivers(Insights& out, const Problem& p, const Budget& b, const uncertainty::Archive& archive) {
   out.source = Insights::Source::None;
   if (b.rows > 0) {
@@ -162,7 +180,21 @@ void read_drivers(Insights& out, const Problem& p, const Budget& b, const uncert
   for (auto& c : out.drivers.outcomes)
     for (const auto& d : by_bins.outcomes)
       if (c.outcome == d.outcome) choose(c.inputs, d.inputs, least_apart);
+  if (p.space.has_interaction()) return;
+  for (auto& inputs : out.drivers.outputs) raise_to_bound(inputs);
+  for (auto& c : out.drivers.outcomes) raise_to_bound(c.inputs);
 }
+
+namespace {
+
+/// What boxes are ranked by: the output that a requirement limits first, else the first one.
+int find_ranking_output(const Permissible& permissible, const std::vector<std::string>& outputs) {
+  if (permissible.limits.empty()) return 0;
+  const auto at = std::find(outputs.begin(), outputs.end(), permissible.limits.front().output);
+  return at == outputs.end() ? 0 : static_cast<int>(at - outputs.begin());
+}
+
+}  // namespace
 
 void find_boxes(Insights& out, const Problem& p, const Budget& b, uncertainty::Asker& asker,
                 const std::vector<double>& levels, const std::vector<std::string>& outputs,
@@ -171,7 +203,8 @@ void find_boxes(Insights& out, const Problem& p, const Budget& b, uncertainty::A
   if (std::ranges::none_of(asker.archive().samples(),
                            [](const auto& s) { return s.result.state == uncertainty::Result::State::Done; }))
     return;
-  const uncertainty::Requirement requirement = make_requirement(read_permissible(p.permissible, p), outputs, outcomes);
+  const Permissible permissible = read_permissible(p.permissible, p);
+  const uncertainty::Requirement requirement = make_requirement(permissible, outputs, outcomes);
   const int runs = b.limit - b.outcomes - b.in_boxes, axes = std::max(1, count_axes(p.space));
   uncertainty::DesignOptions o;
   o.space_points = std::min(200 * axes, std::max(1, runs / 4));
@@ -180,6 +213,7 @@ void find_boxes(Insights& out, const Problem& p, const Budget& b, uncertainty::A
   // a box that nothing is left to check is of no use
   o.k_max = std::clamp(runs / (o.fresh + o.rerun_limit + 50 * axes), 2, 6);
   o.levels = levels;
+  o.ranking_output = find_ranking_output(permissible, outputs);
   o.seed = p.seed;
   out.boxes = uncertainty::find_permissible_boxes(p.space, asker, requirement, o);
   out.has_boxes = true;
@@ -191,7 +225,9 @@ void finish_boxes(Insights& in, const Problem& p, uncertainty::Asker& asker, con
   uncertainty::DesignOptions o;
   o.levels = levels;
   o.seed = p.seed;
-  const uncertainty::Requirement requirement = make_requirement(read_permissible(p.permissible, p), outputs, outcomes);
+  const Permissible permissible = read_permissible(p.permissible, p);
+  o.ranking_output = find_ranking_output(permissible, outputs);
+  const uncertainty::Requirement requirement = make_requirement(permissible, outputs, outcomes);
   uncertainty::analyse_on(p.space, in.boxes.boxes, requirement, asker, o);
 }
 

@@ -413,13 +413,16 @@ std::string words_of_point(const Problem& p, const Point& x) {
   const std::vector<std::string> names = make_short_names(p.inputs);
   for (std::size_t i = 0; i < p.inputs.size(); ++i) {
     const uncertainty::FuzzyNumber& f = p.space.inputs[i];
-    const double away = std::max({x[i] - f.core().right, f.core().left - x[i], 0.0});
-    if (!(away > 0.01 * f.width())) continue;
-    text += fmt::format("{}{} {} (core {})", text.empty() ? "" : ", ", names[i],
-                        words_of_value(p.inputs[i], x[i], f.width()),
-                        words_of_number(f.centre() / p.inputs[i].unit_value, f.width() / p.inputs[i].unit_value));
+    if (!(std::abs(x[i] - f.centre()) > 0.01 * f.width())) continue;
+    const auto shown = [&](double v) {
+      return words_of_number(v / p.inputs[i].unit_value, f.width() / p.inputs[i].unit_value);
+    };
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", names[i], words_of_value(p.inputs[i], x[i], f.width()));
+    text += f.core().right - f.core().left > 0.01 * f.width()
+                ? fmt::format(" (core {} to {})", shown(f.core().left), shown(f.core().right))
+                : fmt::format(" (core {})", shown(f.centre()));
   }
-  return text.empty() ? "values within a hundredth of the core" : text;
+  return text.empty() ? "values within a hundredth of their range of the core" : text;
 }
 
 std::vector<Split> find_splits(const uncertainty::Space& space, const uncertainty::Archive& archive,
@@ -567,7 +570,14 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
   }
   const auto add_limit = [&] {
     const Marks marks = count_marks(p, r);
-    if (marks.open > 0)
+    const int left = p.limit - static_cast<int>(runs);
+    if (left > 0)
+      add("limit",
+          fmt::format("Of the runs that were allowed {} are left, too few for what was still to be searched: {} of {} "
+                      "bounds and possibilities may be wider or higher than shown.",
+                      left, marks.open, marks.all),
+          marks.open > 0 ? Status::Warning : Status::Info);
+    else if (marks.open > 0)
       add("limit",
           fmt::format("All runs that were allowed are used up before every search had converged: {} of {} bounds and "
                       "possibilities may be wider or higher than shown.",

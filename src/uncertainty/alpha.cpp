@@ -612,7 +612,6 @@ class Optimisation {
 
   /// Whether kinks are followed: along constraints and for many inputs the planes would take too many runs.
   bool seeks_edges() const { return !has_many_inputs() && !space_.has_interaction(); }
-
   std::unique_ptr<LocalSearch> make_kink_search(const Goal& goal, const Candidate& start) {
     KinkSearch::Options o;
     o.tolerance = least_edge_gain * width_of(goal.output);
@@ -698,9 +697,11 @@ class Optimisation {
         f.last = r.search->value(), f.last_at = r.search->best();
       }
       if (const int at = asker_.archive().find(r.search->best()); at >= 0 && !has_many_inputs()) note_end(r.goal, at);
-      if (seeks_edges() && model && model->is_at_edge() && !model->has_met_walls()) note_kinks(r.goal);
+      const bool is_kinked = model && model->is_at_edge() && !model->has_met_walls() && !has_many_inputs();
+      const bool is_free = is_kinked && is_off_constraints(regions_[r.goal.level], model->best());
+      if (is_free) note_kinks(r.goal);
       if (is_steep(r.goal) && (!model || model->has_met_walls())) continue;
-      const bool is_open = model && has_kinks(r.goal);
+      const bool is_open = model && (has_kinks(r.goal) || is_kinked);
       double& end = (is_open ? edges_ : ends_).try_emplace(key_of(r.goal), infinite).first->second;
       end = std::min(end, r.search->value());
     }

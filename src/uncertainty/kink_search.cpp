@@ -69,6 +69,16 @@ std::vector<double> find_lowest(const std::vector<double>& at, const std::vector
   return d;
 }
 
+bool is_off_constraints(const Region& region, const Point& at) {
+  constexpr double off = 2e-3;  // of the support's width
+  if (!region.space->has_interaction()) return true;
+  return std::all_of(region.axes.begin(), region.axes.end(), [&](int i) {
+    Point low = at, high = at;
+    low[i] -= off * region.scale[i], high[i] += off * region.scale[i];
+    return region.contains(clip(region.box, std::move(low))) && region.contains(clip(region.box, std::move(high)));
+  });
+}
+
 KinkSearch::KinkSearch(Region region, Point start, const Told& at_start, const Options& options)
     : LocalSearch(std::move(start), at_start),
       region_(std::move(region)),
@@ -82,17 +92,24 @@ KinkSearch::KinkSearch(Region region, Point start, const Told& at_start, const O
 /// A place, one a little off it, and from there one along every axis.
 void KinkSearch::ask(const Point& x) {
   const double off = 1e-3 * radius_, h = 1e-4 * radius_;
-  Point near = x;
-  for (const int i : region_.axes) {
-    const double reach = random_.next(-off, off) * region_.scale[i];
-    const bool is_inside = x[i] + reach >= region_.box.lower[i] && x[i] + reach <= region_.box.upper[i];
-    near[i] += is_inside ? reach : -reach;
-  }
-  pending_ = {x, clip(region_.box, near)};
-  for (const int i : region_.axes) {
-    Point beside = pending_[1];
-    beside[i] += (beside[i] + h * region_.scale[i] <= region_.box.upper[i] ? h : -h) * region_.scale[i];
-    pending_.push_back(clip(region_.box, std::move(beside)));
+  // along constraints perhaps not at once
+  constexpr int most = 16;
+  for (int attempt = 0; attempt < most; ++attempt) {
+    Point near = x;
+    for (const int i : region_.axes) {
+      const double reach = random_.next(-off, off) * region_.scale[i];
+      const bool is_inside = x[i] + reach >= region_.box.lower[i] && x[i] + reach <= region_.box.upper[i];
+      near[i] += is_inside ? reach : -reach;
+    }
+    pending_ = {x, clip(region_.box, near)};
+    for (const int i : region_.axes) {
+      Point beside = pending_[1];
+      beside[i] += (beside[i] + h * region_.scale[i] <= region_.box.upper[i] ? h : -h) * region_.scale[i];
+      pending_.push_back(clip(region_.box, std::move(beside)));
+    }
+    if (!region_.space->has_interaction() ||
+        std::all_of(pending_.begin(), pending_.end(), [this](const Point& p) { return region_.contains(p); }))
+      return;
   }
 }
 
@@ -162,7 +179,7 @@ void KinkSearch::ask_next() {
              : step[k] == upper[k] && upper[k] < radius_ ? region_.box.upper[i]
                                                          : best_[i] + step[k] * region_.scale[i];
     }
-    x = clip(region_.box, std::move(x));
+    x = pull_inside(region_, best_, clip(region_.box, std::move(x)));
     if (x == best_) {
       radius_ *= 0.1;
       continue;

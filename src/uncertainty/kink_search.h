@@ -42,6 +42,9 @@ class KinkSearch : public LocalSearch {
   bool is_first_ = true;
 };
 
+/// Whether a place is so far off all constraints that its kinks are none of theirs.
+bool is_off_constraints(const Region&, const Point&);
+
 /// max_j (at[j] + slopes[j]·d), an upper envelope of planes: the place between `lower` and `upper` where it is least.
 std::vector<double> find_lowest(const std::vector<double>& at, const std::vector<std::vector<double>>& slopes,
                                 const std::vector<double>& lower, const std::vector<double>& upper);

@@ -502,6 +502,44 @@ TEST(Story, SaysWhatIsPossibleAndWhatTurnsIt) {
   EXPECT_EQ(by_id["failed"].status, record::Status::Warning);
 }
 
+// Only x acts on the outcome, in a hundredth of its range, and on the wave; bins are wider than both.
+TEST(InsightsReference, AnInputExplainsAtLeastWhatNoOtherHasAPartIn) {
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 0.5, 1), make_triangular(0, 0.5, 1), make_triangular(0, 0.5, 1)}, 3000);
+  constexpr double pi = 3.14159265358979323846;
+  const StudyResult r =
+      run(p, folder, "s", make_factories([](const Point& x) {
+            return done({{"wave", std::sin(20 * pi * x[0])}}, x[0] > 0.3 && x[0] < 0.33 ? "window" : "other");
+          }));
+  ASSERT_EQ(r.insights.source, Insights::Source::Design);
+  const uncertainty::Driver& wave = r.insights.drivers.outputs.at(0).at(0);
+  EXPECT_NEAR(wave.first, 1, 0.05 + 2 * wave.first_error);
+  for (const auto& c : r.insights.drivers.outcomes) {
+    EXPECT_NEAR(c.inputs[0].first, 1, 0.05 + 2 * c.inputs[0].first_error) << c.outcome;
+    EXPECT_LT(c.inputs[0].first_error, 0.2);
+    EXPECT_LT(c.inputs[1].first, 0.1);
+  }
+}
+
+// Boxes are ranked by an output that the requirement names, wherever it stands.
+TEST(Insights, RobustnessIsThatOfWhatTheRequirementLimits) {
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 0.5, 1), make_triangular(0, 0.5, 1)}, 3000);
+  p.permissible = "v <= 1";
+  const auto run_with = [&](bool is_first) {
+    return run(p, folder, is_first ? "a" : "b", make_factories([is_first](const Point& x) {
+                 const double v = x[0] + x[1], junk = 1e3 * std::exp(-20 * x[0]);
+                 return is_first ? done({{"v", v}, {"junk", junk}}, "") : done({{"junk", junk}, {"v", v}}, "");
+               }));
+  };
+  const auto boxes = [](const StudyResult& r) { return r.insights.boxes.boxes; };
+  const auto a = boxes(run_with(true)), b = boxes(run_with(false));
+  ASSERT_FALSE(a.empty());
+  ASSERT_FALSE(b.empty());
+  ASSERT_TRUE(a[0].kept && b[0].kept);
+  EXPECT_NEAR(a[0].robustness / b[0].robustness, 1, 0.2);
+}
+
 TEST(Story, WeighsARequirementOnNumbers) {
   const Folder folder;
   Problem p = make_problem(uncertainty::cases::make_jump_inputs(), 2000);
