@@ -366,6 +366,7 @@ int run_plan_file(const Arguments& a, const std::atomic<bool>& cancel) {
     const product::Plan plan = product::read_plan_file(a.input, warnings, text);
     const collapse::Knowledge knowledge = load_knowledge(a);
     print_diagnostics(warnings, text);
+    if (!a.json) warnings.clear();  // they have been said
     make_run_folder(a.output);
     ProgressLine progress;
     EventPrinter events(out, a.verbose, progress);

@@ -80,8 +80,8 @@ std::string find_what_is_open(const Context& c, const Breaks& breaks) {
   return fastest->speed > kStill
              ? fmt::format("{}{} still moved at {:.1f} m/s when the run ended, and may break this limit.", kNotJudged,
                            who, fastest->speed)
-             : fmt::format("{}it still came down or swayed when the run ended, and {} may break this limit.",
-                           kNotJudged, who);
+             : fmt::format("{}it had not come to rest when the run ended, and {} may break this limit.", kNotJudged,
+                           who);
 }
 
 /// Distances of the nearest and the farthest point of a part from an area in the last frame, seen from above; 0: over
@@ -549,9 +549,8 @@ void add_vibration(const Context& c, const Mechanism& m) {
       if (status == Status::Good && c.is_under_way) {
         status = Status::Info;
       } else if (status == Status::Good) {
-        const std::string why = m.is_final
-                                    ? find_what_may_shake(c, n, s, least)
-                                    : fmt::format("{}it still came down or swayed when the run ended", kNotJudged);
+        const std::string why = m.is_final ? find_what_may_shake(c, n, s, least)
+                                           : fmt::format("{}it had not come to rest when the run ended", kNotJudged);
         if (!why.empty()) text += "." + why, status = Status::NotJudged;
       }
     }
@@ -785,7 +784,7 @@ void add_criteria(const Context& c, const Mechanism& m, const Standing& standing
   const auto falls_on = [&](bool met) -> std::string {
     if (met ? m.is_final && c.charges_left == 0 : !may_become(c, m)) return "";
     if (c.charges_left > 0) return kNotJudged + tell_charges_left(c);
-    return fmt::format("{}it still came down or swayed when the run ended.", kNotJudged);
+    return fmt::format("{}it had not come to rest when the run ended.", kNotJudged);
   };
   if (want.mechanism) {
     const bool met = m.name == *want.mechanism;

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <limits>
 
+#include "base/utf8.h"
+
 namespace topple::product {
 
 namespace {
@@ -246,7 +248,7 @@ std::string TableReader::text(const std::string& key, std::string fallback) {
     error("E202", node->place, key + ": is " + name_of(node->kind) + "; a string is wanted");
     return {};
   }
-  if (node->text.empty() || node->text.size() > longest_text) {
+  if (node->text.empty() || count_characters(node->text) > longest_text) {
     error("E205", node->place, key + (node->text.empty() ? ": is empty" : ": is too long"),
           "allowed: 1 to " + std::to_string(longest_text) + " characters");
     return {};

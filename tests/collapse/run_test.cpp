@@ -508,8 +508,8 @@ TEST(Run, WhatMayStillBeBrokenWhenTheTimeIsOverIsNotJudged) {
   const record::Record at_once = run_for("0.06 s");
   for (const std::string id : {"clearance.near", "criterion.debris_reach"}) {
     EXPECT_TRUE(is_not_judged(finding(at_once, id))) << id;
-    EXPECT_THAT(finding(at_once, id).text, testing::HasSubstr("Not judged: it still came down or swayed when the run "
-                                                              "ended, and "))
+    EXPECT_THAT(finding(at_once, id).text,
+                testing::HasSubstr("Not judged: it had not come to rest when the run ended, and "))
         << id;
   }
   EXPECT_EQ(finding(at_once, "clearance.far").status, record::Status::Good);
@@ -542,7 +542,7 @@ TEST(Run, WhatWasAskedIsNotBrokenBeforeItIsFinal) {
     EXPECT_THAT(finding(before, id).text, testing::EndsWith("Not judged: 3 charges had not fired when the run ended."));
     EXPECT_TRUE(is_not_judged(finding(falling, id))) << finding(falling, id).text;
     EXPECT_THAT(finding(falling, id).text,
-                testing::EndsWith("Not judged: it still came down or swayed when the run ended."));
+                testing::EndsWith("Not judged: it had not come to rest when the run ended."));
   }
   EXPECT_EQ(finding(before, "mechanism").status, record::Status::NotJudged);
   EXPECT_TRUE(is_not_judged(finding(before, "criterion.debris_reach"))) << "nothing has come down that could reach it";

@@ -233,7 +233,7 @@ describe("the German table", () => {
     assert.equal(translate("First touchdown of the upper block: A 4.80 s, B 4.85 s, difference +0.050 s."), "Erstes Aufsetzen des oberen Blocks: A 4,80 s, B 4,85 s, Unterschied +0,050 s.");
     assert.equal(translate("Hall: parts come 5.6 m farther than in this run; the limit of 4.0 m is then broken."), "Hall: Teile kommen 5,6 m weiter als in dieser Rechnung; der Grenzwert von 4,0 m ist dann unterschritten.");
     assert.equal(translate("The nearest part, C-A1-0, comes to 9.6 m at 4.10 s; the limit is 4.0 m."), "Das nächste Teil, C-A1-0, kommt bei 4,10 s auf 9,6 m heran; der Grenzwert ist 4,0 m.");
-    assert.equal(translate("Asked: topple; found: topple. Not judged: it still came down or swayed when the run ended."), "Verlangt: Kippen; gefunden: Kippen. Nicht beurteilt: Am Ende der Rechnung kam es noch herab oder schwankte.");
+    assert.equal(translate("Asked: topple; found: topple. Not judged: it had not come to rest when the run ended."), "Verlangt: Kippen; gefunden: Kippen. Nicht beurteilt: Am Ende der Rechnung war es noch nicht in Ruhe.");
     assert.match(translate("The nearest part, chimney/12, comes to 26.1 m at 4.00 s; the limit is 5.0 m. Not judged: chimney/12 still moved at 4.6 m/s when the run ended, and may break this limit."),
       / der Grenzwert ist 5,0 m\. Nicht beurteilt: chimney\/12 bewegte sich am Ende der Rechnung noch mit 4,6 m\/s /);
     assert.equal(translate("Frames"), "Rahmen"); // of the building
