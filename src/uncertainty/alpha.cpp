@@ -698,10 +698,10 @@ class Optimisation {
       }
       if (const int at = asker_.archive().find(r.search->best()); at >= 0 && !has_many_inputs()) note_end(r.goal, at);
       const bool is_kinked = model && model->is_at_edge() && !model->has_met_walls() && !has_many_inputs();
-      const bool is_free = is_kinked && is_off_constraints(regions_[r.goal.level], model->best());
-      if (is_free) note_kinks(r.goal);
+      const bool is_free = is_off_constraints(regions_[r.goal.level], r.search->best());
+      if (is_kinked && is_free) note_kinks(r.goal);
       if (is_steep(r.goal) && (!model || model->has_met_walls())) continue;
-      const bool is_open = model && (has_kinks(r.goal) || is_kinked);
+      const bool is_open = has_kinks(r.goal) ? model || !is_free : is_kinked;
       double& end = (is_open ? edges_ : ends_).try_emplace(key_of(r.goal), infinite).first->second;
       end = std::min(end, r.search->value());
     }
