@@ -134,7 +134,13 @@ void System::pack_pair(size_t joint, const JointCluster& c) {
     put3(kLeverChild, child_in_parent * to_M);
     put3(kReach, reach);
     const Quat q = to_quat(child_in_parent);
-    const double parts[4] = {q.w, q.x, q.y, q.z};
+    // of both quaternions of the child that which it has goes on
+    double sign = 1;
+    if (moving(j.parent) && moving(j.child)) {
+      const Quat now = conjugate(state.q[static_cast<size_t>(j.parent)]) * state.q[static_cast<size_t>(j.child)];
+      if (now.w * q.w + now.x * q.x + now.y * q.y + now.z * q.z < 0) sign = -1;
+    }
+    const double parts[4] = {sign * q.w, sign * q.x, sign * q.y, sign * q.z};
     for (int i = 0; i < 4; ++i) put(kRelative + i, parts[i]);
     put(kChildShare, child.mass / whole);
     put(kReducedMass, reduced);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <optional>
 
 #include "mbs/quantity.h"
 #include "mechanisms.h"
@@ -519,6 +520,32 @@ TEST(JointPhysics, EquilibriumHangsOnNoOrderOfBodies) {
   }
   EXPECT_NEAR(20 * angle[0], 5 * 9.81 * 0.5 * std::cos(angle[0]), 1e-6);
   EXPECT_NEAR(angle[1], angle[0], 1e-9);
+}
+
+TEST(JointPhysics, AWeldedBodyKeepsTheSignOfItsOrientation) {
+  // of both quaternions of an orientation; from a parent at 2 rad the other one is found for a child at -2 rad
+  Model m = empty_model();
+  m.gravity = {};
+  for (const double turn : {2.0, -2.0}) {
+    Body b = test::make_rod("rod", 1, {0, 0, 0}, {1, 0, 0});
+    b.inertia = Mat3::diagonal({0.1, 0.2, 0.2});
+    b.X_WB.q = exp_rotation({0, 0, turn});
+    b.w_WB = {0.1, 0.2, 0.3};
+    add_body(m, b);
+  }
+  test::join(m, Joint::Kind::Fixed, {0}, {1}, {0.3, 0, 0}, {}, "weld");
+  Options o = options_of(0.05, 1e-3);
+  o.frame_interval = 1e-3;
+  double largest = 0;
+  std::optional<Quat> before;
+  o.on_frame = [&](const View& v) {
+    const Quat& q = v.X_WB[1].q;
+    if (before) largest = std::max(largest, std::hypot(q.w - before->w, q.x - before->x, q.z - before->z));
+    before = q;
+  };
+  (void)run(m, o);
+  EXPECT_GT(largest, 0);
+  EXPECT_LT(largest, 1e-2);
 }
 
 TEST(JointPhysics, AHingeCountsAllTurnsOfWhatSpinsFast) {
