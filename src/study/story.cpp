@@ -56,11 +56,12 @@ std::string quoted(const std::string& name) { return name.empty() ? "the outcome
 
 std::string percent(double part) { return fmt::format("{:.0f} %", 100 * part); }
 
-/// Rounded up or down to so many digits behind the point; what is a number of so many digits but for its last bits
-/// stays that number.
+/// Rounded up or down to so many digits behind the point; what is a number of so many digits but for what searches
+/// leave stays that number.
 std::string round_towards(double x, int digits, bool is_up) {
+  constexpr double left = 1e-5;  // of the last digit
   const double unit = std::pow(10, digits), y = x * unit;
-  const double whole = is_up ? std::ceil(y - 1e-9) : std::floor(y + 1e-9);
+  const double whole = is_up ? std::ceil(y - left) : std::floor(y + left);
   return fmt::format("{:.{}f}", whole / unit + 0.0, digits);
 }
 
