@@ -141,6 +141,7 @@ std::string words_of_drivers(const Problem& p, const std::vector<uncertainty::Dr
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return drivers[a].first > drivers[b].first; });
   std::string known, unknown;
+  bool has_total = false;
   const std::vector<std::string> names = study::make_short_names(p.inputs);
   for (const std::size_t i : order) {
     const uncertainty::Driver& d = drivers[i];
@@ -149,9 +150,13 @@ std::string words_of_drivers(const Problem& p, const std::vector<uncertainty::Dr
       if (std::isfinite(d.total)) known += fmt::format(" (with others {:.2f} +- {:.2f})", d.total, d.total_error);
     } else {
       unknown += fmt::format("{}{}", unknown.empty() ? "" : ", ", names[i]);
+      // what acts only together with others has a total that is known
+      if (!(d.total > 2 * d.total_error) || !(d.total >= 0.05)) continue;
+      unknown += fmt::format(" (with others {:.2f} +- {:.2f})", d.total, d.total_error);
+      has_total = true;
     }
   }
-  if (known.empty()) return "unknown: no share is larger than its error";
+  if (known.empty()) return has_total ? "unknown alone: " + unknown : "unknown: no share is larger than its error";
   return unknown.empty() ? known : known + "; unknown: " + unknown;
 }
 
