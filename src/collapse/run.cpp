@@ -90,12 +90,13 @@ void add_checks(const mbs::Model& model, const mbs::Summary& s, bool equilibrium
     add(fmt::format("note.{}", i + 1), "Note", s.notes[i], std::numeric_limits<double>::quiet_NaN(), "", Status::Info);
 }
 
-/// run_plan; `looks_across`: an equilibrium of its own says what heads of ground columns bear about the other axis.
+/// run_plan; `has_zones`: resistance is that of zones alone. Then an equilibrium of its own says what heads of ground
+/// columns bear about the other axis, and spans are looked at beside the model.
 record::Record run_with(const product::Plan& plan, const Knowledge& k, const RunOptions& options,
-                        const RunCallbacks& callbacks, const std::string& engine, const Mover& move,
-                        bool looks_across) {
+                        const RunCallbacks& callbacks, const std::string& engine, const Mover& move, bool has_zones) {
   ModelMap map;
   const mbs::Model model = make_model(plan, k, map, options.threads);
+  if (!has_zones) map.spans.clear();
   record::Record r;
   r.counts = count(model);
   if (callbacks.on_model) callbacks.on_model(model, map, r.counts);
@@ -114,7 +115,7 @@ record::Record run_with(const product::Plan& plan, const Knowledge& k, const Run
   end_record(summary, " before the first charge", recorder, r);
   const std::atomic<bool>* cancel = callbacks.progress.cancel;
   std::optional<HeadsAcross> across;
-  if (looks_across && has_heads(map) && (r.ending == "at_rest" || r.ending == "time_limit"))
+  if (has_zones && has_heads(map) && (r.ending == "at_rest" || r.ending == "time_limit"))
     across = find_heads_across(plan, k, options, cancel, move);
   add_findings(plan, model, map, k, recorder, summary, r, nullptr,
                across && !callbacks.progress.is_cancelled() ? &*across : nullptr);
