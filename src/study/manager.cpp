@@ -313,6 +313,12 @@ class Manager {
       find_requirement(r, problem_, asker, names_.outputs, names_.outcomes);
       asker.set_limit(budget.limit - budget.in_boxes - (asker.asked() - before));
       find_boxes(r.insights, problem_, budget, asker, options.levels, names_.outputs, names_.outcomes);
+      if (r.insights.has_boxes && !asker.is_cancelled() &&
+          std::ranges::none_of(r.insights.boxes.boxes, [](const auto& b) { return b.kept; })) {
+        // a check that was cut off goes on with what bounds inside boxes would have had
+        asker.set_limit(budget.limit);
+        find_boxes(r.insights, problem_, budget, asker, options.levels, names_.outputs, names_.outcomes);
+      }
     }
     const bool has_boxes = r.insights.has_boxes;
     asker.set_limit(budget.limit - (has_boxes ? budget.in_boxes : 0));
