@@ -343,6 +343,7 @@ int check_plan(const Arguments& a) {
     mbs::check_model(model);
     if (!plan.fuzzy.inputs.empty())  // what only topple study would say
       (void)study::make_plan_problem(plan, {}, a.knowledge.empty() ? std::string() : read_file(a.knowledge));
+    for (Diagnostic& d : collapse::complain_of_spans(plan, map)) warnings.push_back(std::move(d));
     print_diagnostics(warnings, text);
     if (a.json) {
       json out{{"exit_code", kOk}, {"diagnostics", json::array()}};

@@ -114,6 +114,9 @@ struct ModelMap {
   std::vector<std::string> note_texts() const;
 };
 
+/// A warning (W513) where a span bears less than its dead load, at the member that bears least of it.
+std::vector<Diagnostic> complain_of_spans(const product::Plan&, const ModelMap&);
+
 /// About which axis of the grid the heads of ground columns turn: that of the fall, or the other one.
 enum class Heads { OfTheFall, Across };
 

@@ -1,11 +1,15 @@
 /// What a span can bear at the most, where the model has no hinge (docs/theory/manager.md, section 7).
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "collapse/builder.h"
 
 namespace topple::collapse {
+
+using product::Member;
 
 namespace {
 
@@ -65,6 +69,20 @@ void Builder::find_span_margins() {
   }
   std::stable_sort(map.spans.begin(), map.spans.end(),
                    [](const SpanMargin& a, const SpanMargin& b) { return a.margin < b.margin; });
+}
+
+std::vector<Diagnostic> complain_of_spans(const product::Plan& plan, const ModelMap& map) {
+  const auto weak = std::count_if(map.spans.begin(), map.spans.end(), [](const SpanMargin& s) { return s.margin < 1; });
+  if (weak == 0) return {};
+  const SpanMargin& least = map.spans.front();
+  const auto member = std::find_if(plan.members.begin(), plan.members.end(),
+                                   [&least](const Member& m) { return m.name == least.member; });
+  return {
+      {Severity::Warning, "W513", member == plan.members.end() ? SourcePosition{} : member->where, 1,
+       fmt::format("{}: with hinges at both ends and in the middle it bears {:.2f} times its dead load at the most, "
+                   "and could not stand ({} of {} spans do not)",
+                   least.member, least.margin, weak, map.spans.size()),
+       "check its bars and loads; the model has no hinges there and does not see it"}};
 }
 
 }  // namespace topple::collapse

@@ -681,6 +681,21 @@ TEST(Manager, SpansBearWhatThreeHingesBear) {
                most = 8 * 500e6 * (bars * (3 + 4) + 6e-4 * 5) * lever / (5.6 * weight);
   EXPECT_GT(light.at("B-A1B1-0"), least);
   EXPECT_LT(light.at("B-A1B1-0"), most);
+  const auto complaints = [&](const std::string& load) {
+    const product::Plan plan =
+        read(materials() + slabs + grid("A = \"0 m\", B = \"6 m\"", "1 = \"0 m\", 2 = \"5 m\"", 1, load) +
+             "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n[[slabs]]\npanel = \"strong\"\n" +
+             analysis());
+    return complain_of_spans(plan, build(plan, without_limit()).map);
+  };
+  EXPECT_TRUE(complaints("1 kN/m2").empty());
+  const std::vector<Diagnostic> weak = complaints("19 kN/m2");
+  ASSERT_EQ(weak.size(), 1u);
+  EXPECT_EQ(weak[0].code, "W513");
+  EXPECT_NE(weak[0].message.find("S-A1B2-0: with hinges at both ends and in the middle it bears 0.9"),
+            std::string::npos)
+      << weak[0].message;
+  EXPECT_GT(weak[0].where.line, 0);
   // a wall that is cast on a beam bears it
   const auto walled = margins("1 kN/m2", "[[walls]]\npanel = \"thin\"\nat = \"A1B1\"\nstoreys = 0\n");
   EXPECT_EQ(walled.count("B-A1B1-0"), 1u) << "it stands below";
