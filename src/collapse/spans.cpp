@@ -80,7 +80,7 @@ std::vector<Diagnostic> complain_of_spans(const product::Plan& plan, const Model
   return {
       {Severity::Warning, "W513", member == plan.members.end() ? SourcePosition{} : member->where, 1,
        fmt::format("{}: with hinges at both ends and in the middle it bears {:.2f} times its dead load at the most, "
-                   "and could not stand ({} of {} spans do not)",
+                   "and could not stand (so with {} of {} spans)",
                    least.member, least.margin, weak, map.spans.size()),
        "check its bars and loads; the model has no hinges there and does not see it"}};
 }
