@@ -150,6 +150,7 @@ struct Builder : BuilderState {
   void connect_column(const GridPoint&, int member);
   void connect_x_beam(const GridPoint&, int member);
   void connect_y_beam(const GridPoint&, int member);
+  nearfield::PanelRcc make_rcc_of_panel(int member) const;
   void connect_slab(const GridPoint&, int member);
   void connect_wall(const GridPoint&, int member, bool along_x);
   void join_wall(int member, const nearfield::PanelRcc&, const Vec3& base, double low, double high, double width,

@@ -487,12 +487,16 @@ void Builder::connect_y_beam(const GridPoint& at, int index) {
           .index;
 }
 
+nearfield::PanelRcc Builder::make_rcc_of_panel(int index) const {
+  const product::Panel& panel = panel_of(index);
+  return nearfield::make_panel_rcc(panel,
+                                   panel.concrete < 0 ? nullptr : &plan.concretes[static_cast<size_t>(panel.concrete)],
+                                   panel.steel < 0 ? nullptr : &plan.steels[static_cast<size_t>(panel.steel)]);
+}
+
 void Builder::connect_slab(const GridPoint& at, int index) {
   const Member& m = member(index);
-  const product::Panel& panel = panel_of(index);
-  const nearfield::PanelRcc rcc = nearfield::make_panel_rcc(
-      panel, panel.concrete < 0 ? nullptr : &plan.concretes[static_cast<size_t>(panel.concrete)],
-      panel.steel < 0 ? nullptr : &plan.steels[static_cast<size_t>(panel.steel)]);
+  const nearfield::PanelRcc rcc = make_rcc_of_panel(index);
   const double kept = kept_of(index), span_x = m.end.x - m.start.x, span_y = m.end.y - m.start.y;
   const Vec3 middle = 0.5 * (m.start + m.end);
   // a strip as a prismatic member, concentrated at its middle; in its plane a deep beam with shear
@@ -551,9 +555,7 @@ void Builder::connect_wall(const GridPoint& at, int index, bool along_x) {
   const Member& m = member(index);
   const int body = own_body.at(index);
   const product::Panel& panel = panel_of(index);
-  const nearfield::PanelRcc rcc = nearfield::make_panel_rcc(
-      panel, panel.concrete < 0 ? nullptr : &plan.concretes[static_cast<size_t>(panel.concrete)],
-      panel.steel < 0 ? nullptr : &plan.steels[static_cast<size_t>(panel.steel)]);
+  const nearfield::PanelRcc rcc = make_rcc_of_panel(index);
   const int axis = along_x ? 0 : 1;
   double low = 1e30, high = -1e30;
   for (const Part& p : assemblies[static_cast<size_t>(body)].parts) {

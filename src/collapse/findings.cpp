@@ -215,7 +215,7 @@ std::string tell_heads(const Context& c, bool is_across) {
 std::string tell_spans(const Context& c, double margin) {
   const std::vector<SpanMargin>& spans = c.map.spans;
   if (spans.empty() || spans[0].margin >= margin) return "";
-  const auto weak = std::count_if(spans.begin(), spans.end(), [](const SpanMargin& s) { return s.margin < 1; });
+  const size_t weak = c.map.count_weak_spans();
   const std::string lowest =
       fmt::format(" With hinges at both ends and in the middle {} bears {:.2f} times its dead load at the most",
                   spans[0].member, spans[0].margin);
@@ -276,7 +276,7 @@ Standing add_stability(const Context& c) {
     }
     if (across != nullptr && is_standing) text += tell_heads(c, is_across);
     if (!settled && is_standing) text += tell_spans(c, margin);
-    const bool has_weak_span = !settled && !c.map.spans.empty() && c.map.spans[0].margin < 1;
+    const bool has_weak_span = !settled && c.map.count_weak_spans() > 0;
     bool is_still = true, may_fall = false;
     if (settled && is_standing) {
       is_still = block[i].fastest < c.k.rest_speed;

@@ -112,6 +112,7 @@ struct ModelMap {
   double mass = 0;                  // of all bodies [kg]
   double moving_mass = 0;           // without fixed ones [kg]
   std::vector<std::string> note_texts() const;
+  size_t count_weak_spans() const;  // that bear less than their dead load
 };
 
 /// A warning (W513) where a span bears less than its dead load, at the member that bears least of it.

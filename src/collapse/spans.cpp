@@ -58,10 +58,7 @@ void Builder::find_span_margins() {
       if (beam >= 0) span -= 0.5 * section_of(beam).width;
     }
     if (!is_between_beams) continue;  // its strips have zones at their ends
-    const product::Panel& panel = panel_of(index);
-    const nearfield::PanelRcc rcc = nearfield::make_panel_rcc(
-        panel, panel.concrete < 0 ? nullptr : &plan.concretes[static_cast<size_t>(panel.concrete)],
-        panel.steel < 0 ? nullptr : &plan.steels[static_cast<size_t>(panel.steel)]);
+    const nearfield::PanelRcc rcc = make_rcc_of_panel(index);
     const Vec3 size = member(index).end - member(index).start;
     const double kept = kept_of(index);
     add(index, g * mass_of_slab(at, index) / std::abs(size.x * size.y) * span, span, kept * rcc.moment_pos,
@@ -71,8 +68,13 @@ void Builder::find_span_margins() {
                    [](const SpanMargin& a, const SpanMargin& b) { return a.margin < b.margin; });
 }
 
+size_t ModelMap::count_weak_spans() const {
+  return static_cast<size_t>(
+      std::count_if(spans.begin(), spans.end(), [](const SpanMargin& s) { return s.margin < 1; }));
+}
+
 std::vector<Diagnostic> complain_of_spans(const product::Plan& plan, const ModelMap& map) {
-  const auto weak = std::count_if(map.spans.begin(), map.spans.end(), [](const SpanMargin& s) { return s.margin < 1; });
+  const size_t weak = map.count_weak_spans();
   if (weak == 0) return {};
   const SpanMargin& least = map.spans.front();
   const auto member = std::find_if(plan.members.begin(), plan.members.end(),

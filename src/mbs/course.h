@@ -12,10 +12,9 @@ namespace topple::mbs {
 
 /// What an error of the balance of energy is measured by.
 struct EnergyScale {
-  double released = 0;  // so far [J]
-  double brought =
-      0;             // at the start, 0 of what rests in equilibrium: what springs store counts where it is set free [J]
-  double force = 0;  // weight of all that moves, with the loads that have begun [N]
+  double released = 0;   // so far [J]
+  double brought = 0;    // at the start, 0 where that is an equilibrium: what is set free of it is released [J]
+  double force = 0;      // weight of all that moves, with the loads that have begun [N]
   double round_off = 0;  // what round-off of places makes of the balance [J]
   double step_ways = 0;  // what weight and loads do to bodies at rest in two steps [J]
 };

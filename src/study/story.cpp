@@ -572,19 +572,19 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
   const auto add_limit = [&] {
     const Marks marks = count_marks(p, r);
     const int left = p.limit - static_cast<int>(runs);
-    if (left > 0)
+    if (left > 0 && marks.open > 0)
       add("limit",
           fmt::format("Of the runs that were allowed {} are left, too few for what was still to be searched: {} of {} "
                       "bounds and possibilities may be wider or higher than shown.",
                       left, marks.open, marks.all),
-          marks.open > 0 ? Status::Warning : Status::Info);
+          Status::Warning);
     else if (marks.open > 0)
       add("limit",
           fmt::format("All runs that were allowed are used up before every search had converged: {} of {} bounds and "
                       "possibilities may be wider or higher than shown.",
                       marks.open, marks.all),
           Status::Warning);
-    else
+    else if (left <= 0)
       add("limit",
           "All runs that were allowed are used up. Searches have converged for all bounds and possibilities; more runs "
           "would look for what none of them came near.",
