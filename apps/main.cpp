@@ -2,7 +2,9 @@
 
 #include <atomic>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
+#include <ctime>
 #include <exception>
 
 #include "arguments.h"
@@ -26,10 +28,20 @@ extern "C" void set_endings(void (*handler)(int)) {
   if (!ignores_hangup) std::signal(SIGHUP, handler);
 }
 
-/// The first interrupt ends the run at its next step with its record written; the second one ends the program.
-extern "C" void on_interrupt(int) {
-  cancel.store(true, std::memory_order_relaxed);
-  set_endings(SIG_DFL);
+/// The first interrupt ends the run at its next step with its record written; a later one ends the program. One that
+/// follows at once is the first again: timeout and batch systems send it to the process and to its group.
+extern "C" void on_interrupt(int signal) {
+  constexpr std::int64_t same = 300;  // ms
+  static std::atomic<std::int64_t> first = 0;
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  const std::int64_t time = now.tv_sec * std::int64_t{1000} + now.tv_nsec / 1000000;
+  if (!cancel.exchange(true, std::memory_order_relaxed)) {
+    first = time;
+  } else if (time - first > same) {
+    set_endings(SIG_DFL);
+    raise(signal);
+  }
 }
 
 /// Of verbs that write whole files at their end: the program ends at once.
