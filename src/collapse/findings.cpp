@@ -162,10 +162,12 @@ void add_near_verdicts(const Context& c, const Mechanism& m) {
       text += near.later > 0 ? fmt::format("Judged {:.2f} s later it would be \"{}\".", near.later, near.as.name)
                              : fmt::format("Judged {:.2f} s earlier it would be \"{}\".", -near.later, near.as.name);
       const auto [then, now] = tell_apart(100 * near.as.connected, 100 * m.connected, 0);
-      text += fmt::format(
-          " The largest connected part then holds {} % of the upper mass instead of {} %, it leans by {:.1f} deg, and "
-          "its rear edge has come down {:.0f} % as far as its front edge.",
-          then, now, near.as.tilt / unit::deg, 100 * near.as.rear_share);
+      text += then == now
+                  ? fmt::format(" The largest connected part then holds {} % of the upper mass as well.", then)
+                  : fmt::format(" The largest connected part then holds {} % of the upper mass instead of {} %.", then,
+                                now);
+      text += fmt::format(" It leans by {:.1f} deg, and its rear edge has come down {:.0f} % as far as its front edge.",
+                          near.as.tilt / unit::deg, 100 * near.as.rear_share);
     } else {
       text += fmt::format("With {:g} times the bound of {} it would be \"{}\".", near.times, near.rule, near.as.name);
     }
