@@ -264,12 +264,12 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
   M33<D> axes;     // F, of a member those of its chord
   N sine, cosine;  // of their turn in the plane
   N s2, over_sine, coefficient;
-  // without a member: the way from F to M, the vectors of the quaternions of the turn and of its half
-  V3<D> way, v, v_half;
-  N excess, half_w, half_share;
+  // without a member: the way from F to M, the vector of the quaternion of the turn, twice the inverse of the squared
+  // length of the sum of both quaternions, which lies halfway
+  V3<D> way, v;
+  N excess, per_sum;
   const auto halve = [&](N w) TOPPLE_INLINED {
-    half_w = N{hn::Sqrt(fma(half, abs(w), half).v)};
-    half_share = half / half_w;
+    per_sum = one / (one + abs(w));
     excess = excess_of<D>(s2);
     over_sine = num<D>(2) * fma(s2, excess, one);
   };
@@ -308,11 +308,14 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
       turning<D>(s2, over_sine, coefficient);
     } else {
       halve(apart_by.w);
-      turned = turned.then({half_w, half_share * v.y});
+      const auto sign = hn::CopySign(zero.v, apart_by.w.v);
+      const N sum_w = turned.w + N{hn::Xor(at_b.turn.w.v, sign)}, sum_y = turned.y + N{hn::Xor(at_b.turn.y.v, sign)};
       lever_a.x = fma(half, along_x, lever_a.x), lever_a.z = fma(half, along_z, lever_a.z);
       lever_b.x = fnma(half, along_x, lever_b.x), lever_b.z = fnma(half, along_z, lever_b.z);
+      const N share = per_sum * sum_y;
+      sine = share * sum_w, cosine = fnma(share, sum_y, one);
     }
-    sine = turned.sine(), cosine = turned.cosine();
+    if constexpr (is_member) sine = turned.sine(), cosine = turned.cosine();
     N moved = across_of(), rotation = over_sine * v.y;
     if constexpr (is_member) {
       const N turn_a = over_sine_a * swing_y;
@@ -342,12 +345,13 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
       turning<D>(s2, over_sine, coefficient);
     } else {
       halve(q.w);
-      v_half = half_share * v;
-      qF = qF * Q4<D>{half_w, v_half.x, v_half.y, v_half.z};
+      const auto sign = hn::CopySign(zero.v, q.w.v);
+      const auto add = [&](N a, N b) TOPPLE_INLINED { return a + N{hn::Xor(b.v, sign)}; };
+      axes = to_matrix({add(qF.w, qM.w), add(qF.x, qM.x), add(qF.y, qM.y), add(qF.z, qM.z)}, per_sum);
       const V3<D> to_middle = half * between;
       lever_a = lever_a + to_middle, lever_b = lever_b - to_middle;
     }
-    axes = to_matrix(qF);
+    if constexpr (is_member) axes = to_matrix(qF);
     r = over_sine * v;
     if constexpr (is_member) {
       const N turn_y = over_sine_a * swing_y, turn_z = over_sine_a * swing_z;
@@ -500,7 +504,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
       torque_a = axes * torque_a, torque_b = axes * torque_b;
     } else {
       const V3<D> conjugate = m - excess * cross(v, cross(v, m));
-      torque_a = torque_b = axes * (conjugate + cross(cross(way, shear), half_share * v_half));
+      torque_a = torque_b = axes * (conjugate + cross(cross(way, shear), (half * per_sum) * v));
     }
     const V3<D> force = axes * shear;
     store3<D>(force, out, 0);
