@@ -321,8 +321,8 @@ class System {
   void act(const DueEvent&);
   /// Adds the waiting events whose trigger holds to those due and takes them off the list (triggers.cpp).
   void find_triggered(std::vector<DueEvent>& due);
-  /// When a trigger that holds has passed its limit, between this step and the one before.
-  double find_passing_time(const Trigger&, double before, double now) const;
+  /// When a trigger of an event that holds has passed its limit, between this step and the one before.
+  double find_passing_time(const Event&, const Trigger&, double before, double now) const;
   double calc_component(const Quantity&, int component);
   // springs, bushings, loads (forces.cpp, dampers.cpp, loads.cpp); at rest nothing breaks and no time passes
   void compile_forces();

@@ -116,7 +116,7 @@ void System::find_triggered(std::vector<DueEvent>& due) {
     const size_t first = kept_values;
     for (const Trigger& t : event.triggers) {
       const double x = calc_component(t.quantity, t.component), before = state.trigger_values[value++];
-      if (t.rising ? x >= t.limit : x <= t.limit) passed = std::min(passed, find_passing_time(t, before, x));
+      if (t.rising ? x >= t.limit : x <= t.limit) passed = std::min(passed, find_passing_time(event, t, before, x));
       state.trigger_values[kept_values++] = x;
     }
     if (passed < kUnlimited) {
@@ -135,10 +135,12 @@ void System::find_triggered(std::vector<DueEvent>& due) {
   });
 }
 
-double System::find_passing_time(const Trigger& t, double before, double now) const {
+double System::find_passing_time(const Event& event, const Trigger& t, double before, double now) const {
   // forces are those of the evaluation before
   const double known = is_force(t.quantity.kind) ? state.time - state.last_kick : state.time;
-  if (state.first_kick || before == kUnlimited) return state.time;
+  if (state.first_kick) return state.time;
+  // it waits since this step: what holds now is taken to have held then
+  if (before == kUnlimited) return std::min(event.time, state.time);
   return known - find_passing(before, now, t.limit) * state.last_kick;
 }
 

@@ -144,11 +144,14 @@ Model with(Model m, const Event& e) {
 std::vector<Case> cases() {
   const double late = 0.0707, strength = 5;
   using Kind = Action::Kind;
-  const Trigger far{{Quantity::Kind::Position, 0}, 0, 1.1, true}, hard{{Quantity::Kind::SpringForce, 0}, 0, 4, true};
+  const Trigger far{{Quantity::Kind::Position, 0}, 0, 1.1, true}, near{{Quantity::Kind::Position, 0}, 0, 1.05, true},
+      hard{{Quantity::Kind::SpringForce, 0}, 0, 4, true};
   return {
       {"spring, event", [=] { return with(make_sprung(), make_event(late, Kind::RemoveSpring)); }, calc_place_at(late)},
       {"spring, place", [=] { return with(make_sprung(), make_event(0, Kind::RemoveSpring, {far})); },
        calc_place_from(0.1)},
+      {"spring, place held before", [=] { return with(make_sprung(), make_event(late, Kind::RemoveSpring, {near})); },
+       calc_place_at(late)},
       {"spring, force", [=] { return with(make_sprung(), make_event(0, Kind::RemoveSpring, {hard})); },
        calc_place_from(0.1)},
       {"spring, strength",
