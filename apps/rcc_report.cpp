@@ -58,7 +58,7 @@ record::RccCurve to_record(const nearfield::MomentCurve& c, const nearfield::Rcc
   out.rotation = c.rotation, out.moment = c.moment;
   const nearfield::CurvePoints p = nearfield::find_points(c);
   // none where N is carried with a moment only, or makes the bars yield by itself
-  const bool yields = c.is_balanced && p.yield.rotation > 1e-6 * p.peak.rotation;
+  const bool yields = nearfield::has_yield(c, p);
   if (yields) out.yield = to_record(p.yield);
   out.peak = to_record(p.peak);
   out.ultimate = to_record(p.ultimate), out.residual = to_record(p.residual);
@@ -98,7 +98,8 @@ std::string list_forces(const std::vector<double>& forces) {
   std::string out;
   for (size_t i = 0; i < forces.size() && i < 3; ++i)
     out += fmt::format("{}{:.4g}", i > 0 ? ", " : "", -forces[i] / unit::MN);
-  return out + (forces.size() > 3 ? fmt::format(" MN and {} more", forces.size() - 3) : " MN");
+  if (forces.size() <= 3) return out + " MN";
+  return out + fmt::format(" MN and {} other force{}", forces.size() - 3, forces.size() > 4 ? "s" : "");
 }
 
 /// One line for each normal force, from a moment about y alone to one about z alone.
@@ -121,14 +122,14 @@ void add_biaxial(const nearfield::ZoneInput& in, const std::vector<double>& norm
   }
   if (!all.empty()) r.biaxial_exponent = nearfield::fit_biaxial(all).exponent;
   if (!open.empty())
-    r.notes.push_back(
-        fmt::format("Under {} there is no moment about z alone, or none about y alone: the curve of both axes does not "
-                    "reach it, and the exponent leaves it out.",
-                    list_forces(open)));
+    r.notes.push_back(fmt::format(
+        "Under {}, there is no moment about z alone, or none about y alone: the curve of both axes does not "
+        "reach it, and the exponent leaves it out.",
+        list_forces(open)));
   if (!bulging.empty())
     r.notes.push_back(
-        fmt::format("Under {} more moment about one axis is resisted together with one about the other than without "
-                    "it: no exponent meets that curve, and it is left out.",
+        fmt::format("Under {}, a larger moment about one axis is resisted together with one about the other than "
+                    "without it: no exponent meets that curve, and it is left out.",
                     list_forces(bulging)));
 }
 
@@ -290,6 +291,10 @@ record::RccReport make_rcc_report(const nearfield::ZoneInput& in, const nearfiel
   r.axial.push_back(make_axial(rcc));
   if (is_same(rcc.y_pos, rcc.y_neg) && is_same(rcc.z_pos, rcc.z_neg))
     r.notes.push_back("The section is symmetric: both directions of each axis give the same curve.");
+  else if (!r.biaxial.empty())
+    r.notes.push_back(
+        "The curve of both axes is that of positive moments about both; the section is not symmetric, and towards its "
+        "other sides it has others.");
   r.not_modelled = {
       "Slip of bars and their anchorage beyond the zone: bond is perfect.",
       "Shear deformation, and loss of shear strength with rotation; shear and torsion are limits of their own.",

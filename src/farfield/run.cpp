@@ -359,7 +359,7 @@ class Course {
     const bool is_first = time() - state_.swings_since < k_.rest_time;
     if (is_first && (!state_.swing.has_turned || state_.swing.is_short)) return true;
     const long long to =
-        static_cast<long long>(std::floor(schedule_[state_.next_firing].time / options_.frame_interval)) - 2;
+        static_cast<long long>(std::floor(schedule_[state_.next_firing].time / options_.frame_interval)) - 1;
     if (to <= state_.next_frame) return true;
     if (!state_.unsettled.empty() && state_.unsettled.back().firing == state_.next_firing) return true;
     mbs::Energy before = motion_.calc_view(system_, time()).energy;

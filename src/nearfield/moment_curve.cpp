@@ -179,31 +179,36 @@ CurvePoints find_points(const MomentCurve& c) {
   return find_points(c.rotation, c.moment, {c.yield_rotation, c.yield_moment}, c.first_torn);
 }
 
+bool has_yield(const MomentCurve& c, const CurvePoints& p) {
+  constexpr double none = 1e-6;  // of the peak's rotation: the force alone makes the bars yield
+  return c.is_balanced && p.yield.rotation > none * p.peak.rotation;
+}
+
 Interaction make_interaction(const Fibres& fibres, Axis axis, int direction, const MomentFamily& family, double length,
                              int count) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   Interaction out;
   const int side = side_of(axis, direction);
-  std::vector<double> kappa = refine_rotations(family, 4);
-  for (double& k : kappa) k /= length;
+  const std::vector<double> rotation = refine_rotations(family, 4);
   const double low = family.normal_force.front(), high = family.normal_force.back();
   for (int i = 0; i < count; ++i) {
     const bool is_end = i == 0 || i + 1 == count;
     constexpr double inside = 1e-6;  // of the force: where both ends are carried still
     const double N = low + (high - low) * i / (count - 1);
-    const March march = march_curvature(fibres, is_end ? (1 - inside) * N : N, side, kappa);
+    const MomentCurve curve =
+        make_moment_curve(fibres, axis, is_end ? (1 - inside) * N : N, direction, length, rotation);
     out.normal_force.push_back(N);
-    if (march.is_balanced && is_end) {
+    if (curve.is_balanced && is_end) {
       out.yield_moment.push_back(0), out.peak_moment.push_back(0);
-    } else if (march.is_balanced) {
-      out.yield_moment.push_back(march.yield_moment);
-      out.peak_moment.push_back(*std::max_element(march.moment.begin(), march.moment.end()));
+    } else if (curve.is_balanced) {
+      const CurvePoints points = find_points(curve);
+      out.yield_moment.push_back(has_yield(curve, points) ? curve.yield_moment : nan);
+      out.peak_moment.push_back(std::isfinite(points.peak.moment) ? points.peak.moment : 0);
     } else {  // the march begins with a moment, which may have the other sign
       out.yield_moment.push_back(nan);
       double most = -std::numeric_limits<double>::infinity();
-      for (size_t j = 0; j < march.eps_0.size() && (j == 0 || !is_end); ++j)
-        most = std::max(
-            most, side * calc_resultants(fibres, march.eps_0[j], march.origin + side * kappa[j], march.bars_at(j)).M);
+      for (size_t j = 0; j < curve.eps_0.size() && (j == 0 || !is_end); ++j)
+        most = std::max(most, side * calc_resultants(fibres, curve.eps_0[j], curve.kappa[j], curve.bars[j]).M);
       out.peak_moment.push_back(most);
     }
   }

@@ -50,10 +50,13 @@ struct CurvePoints {
 CurvePoints find_points(const std::vector<double>& rotation, const std::vector<double>& moment, CurvePoint yield,
                         CurvePoint first_torn = {std::numeric_limits<double>::infinity(), 0});
 CurvePoints find_points(const MomentCurve&);
+/// False where the normal force alone makes bars yield, or is carried with a moment only.
+bool has_yield(const MomentCurve&, const CurvePoints&);
 
-/// Resistance over normal force in one direction: first yield and largest moment; both ends are strained evenly, with
-/// the moment that this needs. Where N is carried with a moment to one side only there is no yield (NaN), and a largest
-/// moment below 0 is the least one to the other side that carries it. K forces.
+/// Resistance over normal force in one direction: first yield and largest moment, between rotations of the grid as
+/// well; both ends are strained evenly, with the moment that this needs. Where N makes the bars yield by itself there
+/// is no yield (NaN), nor where it is carried with a moment to one side only; a largest moment below 0 is then the
+/// least one to the other side that carries it. K forces.
 struct Interaction {
   std::vector<double> normal_force, yield_moment, peak_moment;  // rising [N], [N·m] (K)
 };

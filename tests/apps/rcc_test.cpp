@@ -148,7 +148,7 @@ TEST(RccCommand, ForcesCarriedToOneSideHaveNoYield) {
   EXPECT_TRUE(c["stiffness_effective"].is_null());
   for (const auto& s : j["states"]) EXPECT_FALSE(s["axis"] == "y" && s["point"] == "yield");
   EXPECT_TRUE(j["biaxial_exponent"].is_null());
-  EXPECT_NE(j["notes"].dump().find("5.7 MN there is no moment about z alone"), std::string::npos);
+  EXPECT_NE(j["notes"].dump().find("5.7 MN, there is no moment about z alone"), std::string::npos);
 }
 
 TEST(RccCommand, NotesTellWhatStiffnessAndMomentsAreWorth) {

@@ -138,7 +138,31 @@ TEST(MomentCurve, InteractionEndsAtCrushingAndRupture) {
       static_cast<size_t>(std::max_element(i.peak_moment.begin(), i.peak_moment.end()) - i.peak_moment.begin());
   EXPECT_GT(i.normal_force[balanced], 0.5 * rcc.y_pos.normal_force.front());
   EXPECT_LT(i.normal_force[balanced], 0) << "some compression raises the resistance";
-  for (size_t k = 0; k < i.normal_force.size(); ++k) EXPECT_LE(i.yield_moment[k], i.peak_moment[k] * (1 + 1e-12));
+  for (size_t k = 0; k < i.normal_force.size(); ++k) EXPECT_FALSE(i.yield_moment[k] > i.peak_moment[k] * (1 + 1e-12));
+}
+
+TEST(MomentCurve, InteractionIsThePeaksOfCurves) {
+  const ZoneInput in = make_zone();
+  const Rcc rcc = make_rcc(in);
+  const Fibres f = make_fibres(in, Axis::Y);
+  constexpr int count = 61;
+  const Interaction all = make_interaction(f, Axis::Y, 1, rcc.y_pos, in.length, count);
+  const std::vector<double> rotation = refine_rotations(rcc.y_pos, 4);
+  int yielding = 0, refined = 0;
+  for (size_t k = 1; k + 1 < count; ++k) {
+    const MomentCurve c = make_moment_curve(f, Axis::Y, all.normal_force[k], 1, in.length, rotation);
+    const CurvePoints p = find_points(c);
+    EXPECT_DOUBLE_EQ(all.peak_moment[k], p.peak.moment) << all.normal_force[k];
+    if (!std::binary_search(rotation.begin(), rotation.end(), p.peak.rotation)) ++refined;
+    if (!(p.yield.rotation > 1e-6 * p.peak.rotation)) {
+      ++yielding;
+      EXPECT_TRUE(std::isnan(all.yield_moment[k])) << all.normal_force[k];
+    } else {
+      EXPECT_DOUBLE_EQ(all.yield_moment[k], c.yield_moment) << all.normal_force[k];
+    }
+  }
+  EXPECT_GT(yielding, 0) << "near rupture the force alone makes the bars yield";
+  EXPECT_GT(refined, 0) << "near rupture the moment rises until the force is lost";
 }
 
 TEST(MomentCurve, InteractionOfAnUnsymmetricSectionIsOneLoop) {
