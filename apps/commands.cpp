@@ -170,10 +170,15 @@ constexpr const char* kNoBundle =
 
 }  // namespace
 
-void make_folder(const std::string& path, const std::vector<const char*>& files) {
+void refuse_file(const std::string& path) {
   std::error_code failure;
   if (fs::exists(path, failure) && !fs::is_directory(path, failure))
     throw InputError("E801", fmt::format("--output: {} is a file; a folder is wanted", path));
+}
+
+void make_folder(const std::string& path, const std::vector<const char*>& files) {
+  refuse_file(path);
+  std::error_code failure;
   fs::create_directories(path, failure);
   if (failure) throw std::runtime_error(path + ": the folder cannot be made: " + failure.message());
   if (access(path.c_str(), W_OK | X_OK) != 0)

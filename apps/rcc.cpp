@@ -339,6 +339,7 @@ int compute_rcc(const Arguments& a, const std::atomic<bool>& cancel) {
     read_positive(a.rotation, Dimension::Angle, "--rotation");  // before any work
     read_positive(a.element_size, Dimension::Length, "--element-size");
     refuse_idle_options(a);
+    if (!a.output.empty()) refuse_file(a.output);
     Task task = a.member.empty() ? read_section_task(a, warnings, text) : read_member_task(a, warnings, text);
     std::optional<product::FuzzyFile> fuzzy;
     if (!a.fuzzy.empty()) {

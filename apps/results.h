@@ -69,7 +69,10 @@ std::string write_run_options(const Arguments&);
 /// Refuses to write over what is read. Throws InputError E801.
 void check_own_input(const std::string& output, const std::string& input);
 
-/// Throws InputError E801 if the path is that of a file, std::runtime_error with the path if there is no folder that
+/// Throws InputError E801 if the path of a folder that is to come is that of a file.
+void refuse_file(const std::string& path);
+
+/// As refuse_file(), and throws std::runtime_error with the path if there is no folder that
 /// can be written to, or a folder in the place of one of the files that are to come.
 void make_folder(const std::string& path, const std::vector<const char*>& files = {});
 /// The same for the files of a run.

@@ -645,6 +645,8 @@ rcc)
   { echo 'concrete.fc = { triangular = ["20 N/mm2", "25 N/mm2", "40 N/mm2"] }'; echo 'concrete.fct = { formula = "(fc - 26) / 30" }'; } >negative.toml
   expect 2 "$topple" rcc "$zone" --fuzzy negative.toml; has err '-0.0333333 N/mm2'; lacks err ' Pa"'
   [ ! -e none ] || { echo "a folder was made for a wrong section"; failures=$((failures + 1)); }
+  echo kept >taken
+  expect 2 "$topple" rcc "$zone" -o taken; has err "taken is a file; a folder is wanted"; [ ! -s out ] || { echo "it was computed for nothing"; failures=$((failures + 1)); }
   # the solid route
   coarse=(--element-size "15 cm" --rotation "0.002 rad")
   expect 0 "$topple" rcc "$zone" --normal-force "1 MN" --route solid "${coarse[@]}" -o s1
