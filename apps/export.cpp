@@ -28,10 +28,10 @@ int export_adams(const Arguments& a) {
     const engines::AdamsFiles files =
         engines::to_adams(model, settings, std::filesystem::path(a.output).stem().string());
     const std::string commands = std::filesystem::path(a.output).replace_extension(".acf").string();
-    if (commands == a.output)
-      throw InputError("E801", a.output + ": commands go into the .acf beside the dataset",
-                       "give -o a name that ends in .adm");
     for (const std::string& path : {a.output, commands}) check_own_input(path, a.input);
+    if (std::filesystem::path(a.output).extension() != ".adm")
+      throw InputError("E801", a.output + ": the commands beside the dataset, in the .acf, name it as an .adm",
+                       "give -o a name that ends in .adm");
     replace_file(a.output, files.dataset);
     replace_file(commands, files.commands);
     std::printf("Wrote %s\nWrote %s\n", a.output.c_str(), commands.c_str());

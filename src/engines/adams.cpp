@@ -23,6 +23,9 @@ using mbs::Characteristic;
 std::string num(double x) { return fmt::format("{}", x == 0 ? 0.0 : x); }
 std::string num(const Vec3& v) { return num(v.x) + ", " + num(v.y) + ", " + num(v.z); }
 
+/// Within an expression, where no two operators follow each other.
+std::string term(double x) { return x < 0 ? "(" + num(x) + ")" : num(x); }
+
 /// Names of ADAMS: letters, digits, underscores.
 std::string plain_name(const std::string& name) {
   std::string out;
@@ -321,11 +324,11 @@ class Dataset {
   std::string express(const Characteristic& c, const std::string& variable) {
     switch (c.kind) {
       case Characteristic::Kind::Linear:
-        return fmt::format("{}*({})", num(c.rate), variable);
+        return fmt::format("{}*({})", term(c.rate), variable);
       case Characteristic::Kind::Polynomial: {
         std::string sum;
         for (size_t i = 0; i < c.coefficients.size(); ++i)
-          sum += fmt::format("{}{}*({})**{}", i == 0 ? "" : "+", num(c.coefficients[i]), variable, i);
+          sum += fmt::format("{}{}*({})**{}", i == 0 ? "" : "+", term(c.coefficients[i]), variable, i);
         return sum.empty() ? "0.0" : "(" + sum + ")";
       }
       case Characteristic::Kind::Table:
@@ -374,7 +377,7 @@ class Dataset {
     if (std::min(s.tension_strength, s.compression_strength) < mbs::kUnlimited)
       losses_.add("a spring never breaks: its strength is left out");
     const int I = add_marker(s.b, s.p_B), J = add_marker(s.a, s.p_A);
-    const std::string pull = express(s.spring, fmt::format("DM({},{})-{}", I, J, num(s.free_length)));
+    const std::string pull = express(s.spring, fmt::format("DM({},{})-{}", I, J, term(s.free_length)));
     const std::string damp = express(s.damper, fmt::format("VR({},{})", I, J));
     statement("SFORCE", ++sforces_, s.name);  // positive pushes apart
     text_ += fmt::format(", TRANSLATIONAL\n, I = {}\n, J = {}\n, FUNCTION = -{}\n, -{}\n", I, J, pull, damp);
@@ -386,7 +389,7 @@ class Dataset {
     const JointIds& j = joint_[static_cast<size_t>(s.joint.index)];
     if (j.id == 0) return;
     if (s.strength < mbs::kUnlimited) losses_.add("a rotational spring never breaks: its strength is left out");
-    const std::string back = express(s.spring, fmt::format("AZ({},{})-{}", j.M, j.F, num(s.free_angle)));
+    const std::string back = express(s.spring, fmt::format("AZ({},{})-{}", j.M, j.F, term(s.free_angle)));
     const std::string damp = express(s.damper, fmt::format("WZ({},{},{})", j.M, j.F, j.F));
     statement("SFORCE", ++sforces_, s.name);
     text_ += fmt::format(", ROTATIONAL\n, I = {}\n, J = {}\n, FUNCTION = -{}\n, -{}\n", j.M, j.F, back, damp);
@@ -401,7 +404,7 @@ class Dataset {
     const double length = norm(X_WB(c.b) * c.p_B - X_WB(c.a) * c.p_A);
     statement("SFORCE", ++sforces_, c.name);
     text_ += fmt::format(", TRANSLATIONAL\n, I = {}\n, J = {}\n, FUNCTION = -MAX(0.0,{}+{}*(DM({},{})-{}))\n", I, J,
-                         num(c.pretension), num(c.stiffness), I, J, num(length));
+                         num(c.pretension), term(c.stiffness), I, J, term(length));
     cable_.back() = sforces_;
   }
 
@@ -411,7 +414,7 @@ class Dataset {
     std::string factor;
     if (!l.time.empty()) {
       Characteristic table{Characteristic::Kind::Table, 0, {}, l.time, l.factor};
-      factor = "*" + (l.time.size() > 1 ? express(table, "TIME") : num(l.factor.front()));
+      factor = "*" + (l.time.size() > 1 ? express(table, "TIME") : term(l.factor.front()));
     }
     const int I = add_marker(l.body, l.p_B);
     text_ += fmt::format("MARKER/{}\n, PART = 1\n, FLOATING\n", ++markers_);

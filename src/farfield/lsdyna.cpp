@@ -71,7 +71,12 @@ std::string to_lsdyna(const product::Plan& plan, const Whole& whole, const colla
   Deck d;
   d.keyword("KEYWORD");
   d.keyword("TITLE");
-  std::string title = plan.title.substr(0, 80);
+  // 80 bytes, whole characters; what begins as a keyword or a comment is none behind a blank
+  std::string title = plan.title;
+  if (title.starts_with('*') || title.starts_with('$')) title.insert(0, " ");
+  size_t end = std::min<size_t>(title.size(), 80);
+  while (end < title.size() && end > 0 && (static_cast<unsigned char>(title[end]) & 0xC0) == 0x80) --end;
+  title.resize(end);
   std::replace_if(
       title.begin(), title.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
   d.line(title);

@@ -76,11 +76,12 @@ constexpr double kStraight = 0.8;  // distance of a bar's ends over its length; 
 /// What a body is made of. Points in world axes [m].
 struct Body {
   Shape shape;
-  std::vector<Vec3> points;   // of meshes
-  std::vector<Vec3> normals;  // of their faces, as long as twice the area [m²]
-  double volume = 0;          // of meshes [m³]
-  bool is_round = false;
+  std::vector<Vec3> points;               // of meshes
+  std::vector<Vec3> normals;              // of their faces, as long as twice the area [m²]
+  double volume = 0;                      // of meshes [m³]
+  bool is_round = false;                  // all of its solids are
   bool is_cut = false, is_whole = false;  // along planes that were read; by bodies that were not
+  bool is_partial = false;                // some item of it was not read
   std::string why;                        // what was not understood
 };
 
@@ -286,7 +287,18 @@ class Reader {
     } else if (e->type == "IFCINDEXEDPOLYCURVE") {
       const StepEntity* list = get(e->at(0));
       if (list == nullptr) return false;
-      for (size_t i = 0; i < list->at(0).items.size(); ++i) out.push_back(listed(*list, static_cast<double>(i + 1)));
+      if (e->at(1).items.empty())
+        for (size_t i = 0; i < list->at(0).items.size(); ++i) out.push_back(listed(*list, static_cast<double>(i + 1)));
+      for (const StepValue& segment : e->at(1).items) {
+        std::vector<Vec3> points;
+        for (const StepValue& i : segment.items) points.push_back(listed(*list, i.number));
+        if (segment.text != "IFCARCINDEX")
+          out.insert(out.end(), points.begin(), points.end());
+        else if (points.size() != 3)
+          return false;
+        else
+          add_arc(points[0], points[1], points[2], out);
+      }
     } else if (e->type == "IFCCOMPOSITECURVE") {
       for (const StepValue& part : e->at(0).items) {
         const StepEntity* segment = get(part);
@@ -323,6 +335,29 @@ class Reader {
       out.push_back(X * Vec3{r * std::cos(a), r * std::sin(a), 0});
     }
   }
+  /// From a to the centre of the circle through three points; nothing where they lie on a line.
+  static std::optional<Vec3> find_centre(const Vec3& a, const Vec3& b, const Vec3& c) {
+    const Vec3 u = b - a, v = c - a, n = cross(u, v);
+    if (!(norm(n) > 1e-9 * norm(u) * norm(v))) return std::nullopt;
+    return (0.5 / dot(n, n)) * cross(dot(u, u) * v - dot(v, v) * u, n);
+  }
+  /// From a over b to c; straight where they lie on a line.
+  static void add_arc(const Vec3& a, const Vec3& b, const Vec3& c, std::vector<Vec3>& out) {
+    constexpr int pieces = 16;
+    const std::optional<Vec3> to_centre = find_centre(a, b, c);
+    if (!to_centre) {
+      out.insert(out.end(), {a, b, c});
+      return;
+    }
+    const Vec3 n = cross(b - a, c - a), x = -*to_centre, y = (1 / norm(n)) * cross(n, x), last = c - a - *to_centre;
+    double sweep = std::atan2(dot(last, y), dot(last, x));
+    if (sweep <= 0) sweep += 2 * std::acos(-1.0);
+    for (int i = 0; i < pieces; ++i) {
+      const double t = sweep * i / pieces;
+      out.push_back(a - x + std::cos(t) * x + std::sin(t) * y);
+    }
+    out.push_back(c);
+  }
   /// A piece of a line or a circle, between points or parameters.
   bool find_trimmed(const StepEntity& e, std::vector<Vec3>& out) const {
     const StepEntity* basis = get(e.at(0));
@@ -355,12 +390,29 @@ class Reader {
     const double turn = 2 * std::acos(-1.0);
     const bool is_forward = e.at(3).text != "F";
     double from = parameters[0], to = parameters[1];
-    while (is_forward && to <= from) to += turn;
-    while (!is_forward && to >= from) to -= turn;
+    constexpr double largest = 1e6;  // beyond it no angle is left of a parameter
+    if (!(std::abs(from) < largest && std::abs(to) < largest)) return false;
+    to = from + std::fmod(to - from, turn);
+    if (is_forward && to <= from) to += turn;
+    if (!is_forward && to >= from) to -= turn;
     add_arc(*basis, from, to, out);
     return true;
   }
 
+  /// Of arcs that are one circle.
+  static bool is_circle(const Loop& loop) {
+    constexpr size_t least = 24;  // fewer corners are those of a polygon
+    if (loop.size() < least) return false;
+    const Vec3& a = loop.front();
+    const std::optional<Vec3> to_centre = find_centre(a, loop[loop.size() / 3], loop[2 * loop.size() / 3]);
+    if (!to_centre) return false;
+    const double r = norm(*to_centre);
+    double longest = 0;
+    for (size_t i = 0; i < loop.size(); ++i) longest = std::max(longest, norm(loop[(i + 1) % loop.size()] - loop[i]));
+    return longest < 0.4 * r && std::all_of(loop.begin(), loop.end(), [&](const Vec3& p) {
+             return std::abs(norm(p - a - *to_centre) - r) < 1e-3 * r;
+           });
+  }
   /// Outline and holes of a profile in its own plane; a circle as a polygon.
   bool find_profile(const StepValue& v, std::vector<Loop>& out, bool& is_round, std::string& why) const {
     const StepEntity* e = get(v);
@@ -384,9 +436,9 @@ class Reader {
       return radius > 0;
     }
     if (e->type == "IFCARBITRARYCLOSEDPROFILEDEF" || e->type == "IFCARBITRARYPROFILEDEFWITHVOIDS") {
-      is_round |= is(get(e->at(2)), "IFCCIRCLE");
       out.emplace_back();
       if (!find_points(e->at(2), out.back()) || out.back().size() < 3) return false;
+      is_round |= is(get(e->at(2)), "IFCCIRCLE") || is_circle(out.back());
       for (const StepValue& hole : e->at(3).items) {
         out.emplace_back();
         if (!find_points(hole, out.back())) return false;
@@ -456,9 +508,16 @@ class Reader {
             out.shape.faces.push_back(std::move(corners));
           }
     };
-    const auto add_indexed = [&](const StepEntity& list, const StepValue& indices) {
+    const auto add_indexed = [&](const StepEntity& list, const StepValue& indices, const StepValue& places) {
       std::vector<Vec3> corners;
-      for (const StepValue& i : indices.items) corners.push_back(X * listed(list, i.number));
+      for (const StepValue& i : indices.items) {
+        double index = i.number;
+        if (!places.items.empty()) {
+          const bool is_there = index >= 1 && index <= static_cast<double>(places.items.size());
+          index = is_there ? places.items[static_cast<size_t>(index) - 1].number : 0;
+        }
+        corners.push_back(X * listed(list, index));
+      }
       if (is_mirrored) std::reverse(corners.begin(), corners.end());
       out.shape.faces.push_back(std::move(corners));
     };
@@ -467,10 +526,10 @@ class Reader {
     } else if (e.type == "IFCSHELLBASEDSURFACEMODEL" || e.type == "IFCFACEBASEDSURFACEMODEL") {
       for (const StepValue& shell : e.at(0).items) add_loops(shell);
     } else if (const StepEntity* list = get(e.at(0)); list != nullptr && e.type == "IFCTRIANGULATEDFACESET") {
-      for (const StepValue& triangle : e.at(3).items) add_indexed(*list, triangle);
+      for (const StepValue& triangle : e.at(3).items) add_indexed(*list, triangle, e.at(4));
     } else if (list != nullptr && e.type == "IFCPOLYGONALFACESET") {
       for (const StepValue& f : e.at(2).items)
-        if (const StepEntity* face = get(f)) add_indexed(*list, face->at(0));
+        if (const StepEntity* face = get(f)) add_indexed(*list, face->at(0), e.at(3));
     }
     size_t corners = 0;
     for (size_t i = before; i < out.shape.faces.size(); ++i) corners += out.shape.faces[i].size();
@@ -487,6 +546,10 @@ class Reader {
     for (const StepValue& item : body->at(3).items) use(item, X_WI);
   }
 
+  /// Of a solid that is about to be added.
+  static void note_round(Body& out, bool is_round) {
+    out.is_round = is_round && (out.is_round || out.shape.solids.empty());
+  }
   bool find_item(const StepValue& v, const Map& X, Body& out, int depth) const {
     const StepEntity* e = get(v);
     if (depth > 10) out.why = "its body is nested too deeply";
@@ -497,7 +560,9 @@ class Reader {
         out.why = "the placement of its body is not understood";
         return false;
       }
-      if (!find_profile(e->at(0), solid.loops, out.is_round, out.why)) return false;
+      bool is_round = false;
+      if (!find_profile(e->at(0), solid.loops, is_round, out.why)) return false;
+      note_round(out, is_round);
       const Map X_WP = X * axis_placement(e->at(1));
       const Vec3 way = e->at(3).number * out_.length_unit * direction(e->at(2), {0, 0, 1});
       for (Loop& loop : solid.loops)
@@ -508,9 +573,12 @@ class Reader {
     }
     if (is_boolean(e)) return find_boolean(e, X, out, depth);
     if (e->type == "IFCMAPPEDITEM") {
-      bool any = false;
-      for_mapped_items(*e, X,
-                       [&](const StepValue& item, const Map& X_WI) { any |= find_item(item, X_WI, out, depth + 1); });
+      bool any = false, all = true;
+      for_mapped_items(*e, X, [&](const StepValue& item, const Map& X_WI) {
+        const bool is_read = find_item(item, X_WI, out, depth + 1);
+        any |= is_read, all &= is_read;
+      });
+      out.is_partial |= any && !all;
       return any;
     }
     out.why = "its body is " + e->type;
@@ -543,9 +611,10 @@ class Reader {
     if (!part.why.empty()) out.why = part.why;
     if (!is_read) return false;
     const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+    note_round(out, part.is_round);
     append(out.shape.solids, part.shape.solids);
     append(out.shape.faces, part.shape.faces);
-    out.is_round |= part.is_round, out.is_cut |= part.is_cut, out.is_whole |= part.is_whole;
+    out.is_cut |= part.is_cut, out.is_whole |= part.is_whole, out.is_partial |= part.is_partial;
     if (part.is_cut && part.shape.solids.empty() && part.shape.faces.empty()) out.why = "nothing is left of its body";
     return true;
   }
@@ -627,11 +696,16 @@ class Reader {
       out.why = "its placement is not understood";
       return out;
     }
+    bool any = false, all = true;
     for (const StepValue& v : shape->at(2).items) {
       const StepEntity* r = get(v);
       if (r == nullptr || (r->at(1).kind == Kind::Text && r->at(1).text != "Body")) continue;
-      for (const StepValue& item : r->at(3).items) find_item(item, *X, out, 0);
+      for (const StepValue& item : r->at(3).items) {
+        const bool is_read = find_item(item, *X, out, 0);
+        any |= is_read, all &= is_read;
+      }
     }
+    out.is_partial |= any && !all;
     measure_mesh(out);
     return out;
   }
@@ -642,6 +716,10 @@ class Reader {
     e.is_whole = body.is_whole;
     e.why = body.why;
     if (body.shape.solids.empty() && body.points.size() < 6) return;
+    if (body.is_partial) {
+      e.why = "only a part of its body is read: " + body.why;
+      return;
+    }
     e.low = {1e30, 1e30, 1e30};
     e.high = {-1e30, -1e30, -1e30};
     const auto add = [&e, this](const Vec3& c) {
@@ -658,7 +736,7 @@ class Reader {
     }
     const Vec3 size = e.high - e.low;
     double volume = std::abs(body.volume);
-    for (const Solid& solid : body.shape.solids) volume += solid.volume();
+    volume += calc_volume(body.shape.solids, e.low, e.high);
     const double filled = volume / (size.x * size.y * size.z), round = std::acos(-1.0) / 4;
     if (body.shape.solids.empty()) {
       e.is_round =
@@ -675,16 +753,71 @@ class Reader {
       e.why = "its body has no volume";
       return;
     }
+    const double across = e.type == "IFCCOLUMN" ? size.y : size.z;
+    const double other = e.type == "IFCCOLUMN" ? size.x : std::min(size.x, size.y);
+    const bool is_stretched = e.is_round && std::abs(across - other) >= 0.02 * other;
+    if (is_stretched) e.is_round = false;
     const bool is_panel = e.type == "IFCWALL" || e.type == "IFCSLAB";
     if (e.type == "IFCSLAB") find_outlines(body, e);
     if (!(is_panel ? lies_flat(body, e) : filled >= kFilled * (e.is_round ? round : 1))) {
-      e.why = "it is turned against the grid, or inclined";
+      e.why = is_stretched ? "its profile is round, but as wide as high it is not"
+                           : "it is turned against the grid, or inclined";
       if (!is_panel && !e.is_round && lies_along_axes(body)) e.why = "its profile does not fill its box";
     } else if (is_panel && e.outlines.empty() && !(filled >= (e.type == "IFCWALL" ? kFilledWall : kFilled))) {
       e.why = "its profile does not fill its box";
     } else {
       e.has_box = true;
     }
+  }
+  /// Of solids that may overlap, in world axes; their box is that of building axes [m³].
+  double calc_volume(const std::vector<Solid>& solids, const Vec3& low, const Vec3& high) const {
+    double sum = 0;
+    std::vector<std::pair<Vec3, Vec3>> boxes;
+    for (const Solid& solid : solids) {
+      sum += solid.volume();
+      Vec3 from{1e30, 1e30, 1e30}, to{-1e30, -1e30, -1e30};
+      for (const Vec3& corner : solid.loops.front())
+        for (const Vec3& p : {turn(corner), turn(corner + solid.way)})
+          for (int k = 0; k < 3; ++k) from[k] = std::min(from[k], p[k]), to[k] = std::max(to[k], p[k]);
+      boxes.emplace_back(from, to);
+    }
+    const auto overlap = [](const auto& a, const auto& b) {
+      for (int k = 0; k < 3; ++k)
+        if (!(std::min(a.second[k], b.second[k]) - std::max(a.first[k], b.first[k]) > kNear)) return false;
+      return true;
+    };
+    bool overlaps = false;
+    for (size_t i = 0; i < boxes.size(); ++i)
+      for (size_t j = 0; j < i; ++j) overlaps |= overlap(boxes[i], boxes[j]);
+    constexpr size_t many = 50;
+    if (!overlaps || solids.size() > many) return sum;
+    // by places in the middle of cells
+    constexpr int cells = 32;
+    const Vec3 cell = (1.0 / cells) * (high - low);
+    int inside = 0;
+    for (int i = 0; i < cells; ++i)
+      for (int j = 0; j < cells; ++j)
+        for (int k = 0; k < cells; ++k) {
+          const Vec3 own{low.x + (i + 0.5) * cell.x, low.y + (j + 0.5) * cell.y, low.z + (k + 0.5) * cell.z};
+          const Vec3 p = turn_back(own);
+          inside += std::any_of(solids.begin(), solids.end(), [&](const Solid& s) { return contains(s, p); });
+        }
+    return cell.x * cell.y * cell.z * inside;
+  }
+  static bool contains(const Solid& solid, const Vec3& p) {
+    const Vec3 foot = solid.loops.front().front(), normal = calc_normal(solid.loops.front());
+    const double height = dot(solid.way, normal), t = dot(p - foot, normal) / height;
+    if (!(std::abs(height) > 0) || t < 0 || t > 1) return false;
+    // in axes of the profile
+    const Vec3 z = (1 / norm(normal)) * normal, aside = std::abs(z.x) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
+    const Vec3 x = (1 / norm(cross(z, aside))) * cross(z, aside), y = cross(z, x), q = p - t * solid.way - foot;
+    bool is_inside = false;
+    for (const Loop& loop : solid.loops) {
+      Loop flat;
+      for (const Vec3& c : loop) flat.push_back({dot(c - foot, x), dot(c - foot, y), 0});
+      is_inside ^= lies_within(flat, dot(q, x), dot(q, y));
+    }
+    return is_inside;
   }
   /// Boxes of what is taken out of a wall. Cut, round and turned ones are not read.
   void find_openings(IfcElement& wall) const {
@@ -762,14 +895,17 @@ class Reader {
     if (e->type == "IFCMATERIALLAYER" || e->type == "IFCMATERIALLAYERSETUSAGE" ||
         e->type == "IFCMATERIALPROFILESETUSAGE")
       return name_of_material(e->at(0), depth + 1);
-    if (e->type == "IFCMATERIALPROFILE") return name_of_material(e->at(2), depth + 1);
-    const StepValue& list = e->at(e->type == "IFCMATERIALPROFILESET" ? 2 : 0);
-    // of several layers the thickest one carries
+    if (e->type == "IFCMATERIALPROFILE" || e->type == "IFCMATERIALCONSTITUENT")
+      return name_of_material(e->at(2), depth + 1);
+    const StepValue& list = e->at(e->type == "IFCMATERIALPROFILESET" || e->type == "IFCMATERIALCONSTITUENTSET" ? 2 : 0);
+    // of several layers the thickest one carries, of constituents the largest share, or the first
     double thickest = -1;
     std::string name;
     for (const StepValue& item : list.items) {
       const StepEntity* layer = get(item);
-      const double t = is(layer, "IFCMATERIALLAYER") ? layer->at(1).number : 0;
+      const double t = is(layer, "IFCMATERIALLAYER")         ? layer->at(1).number
+                       : is(layer, "IFCMATERIALCONSTITUENT") ? layer->at(3).number
+                                                             : 0;
       if (t > thickest) thickest = t, name = name_of_material(item, depth + 1);
     }
     return name;
@@ -865,6 +1001,10 @@ class Reader {
   Vec3 turn(const Vec3& p) const {
     const double c = std::cos(out_.angle), s = std::sin(out_.angle);
     return {c * p.x + s * p.y, -s * p.x + c * p.y, p.z};
+  }
+  Vec3 turn_back(const Vec3& p) const {
+    const double c = std::cos(out_.angle), s = std::sin(out_.angle);
+    return {c * p.x - s * p.y, s * p.x + c * p.y, p.z};
   }
 
   /// Axes of bars, in world axes before the turn.

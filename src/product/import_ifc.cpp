@@ -399,9 +399,12 @@ class Planner {
           fmt::format("rows and frames lie at the mean of the columns that stand beside each other: columns were "
                       "moved by up to {:.1f} cm (#{})",
                       100 * most, farthest->id));
-    for (const Group& g : columns_)
+    tell_round(columns_, "columns");
+  }
+  void tell_round(const std::vector<Group>& groups, const char* what) {
+    for (const Group& g : groups)
       if (g.is_round)
-        guessed(fmt::format("round columns became square ones of the same area, {:.0f} cm wide", 100 * g.width));
+        guessed(fmt::format("round {} became square ones of the same area, {:.0f} cm wide", what, 100 * g.width));
   }
   /// Whether an upright element takes half of a storey's height.
   bool reaches_over(const IfcElement& e, int s) const {
@@ -497,12 +500,14 @@ class Planner {
       const char* why = "hangs in the air: no column or wall stands below its end";
       if (hanging > 0) left_out(e, run.edges.empty() ? why : std::string("a span of it ") + why);
       if (run.edges.empty()) continue;
-      const double width = std::min(e.high.x - e.low.x, e.high.y - e.low.y), height = e.high.z - e.low.z;
+      double width = std::min(e.high.x - e.low.x, e.high.y - e.low.y), height = e.high.z - e.low.z;
+      if (e.is_round) width = height = kRound * width;
       claims.all.push_back({&e, group_of(beams_, e, width, height), width * height});
       for (const std::string& edge : run.edges) claims.add(claims.all.back(), run.storey, edge);
     }
     const int placed = settle(beams_, claims, "beams", "larger");
     if (placed > 0) tell_placed(placed, "beam", beams_.size(), "section");
+    tell_round(beams_, "beams");
   }
 
   static bool covers(const IfcElement& slab, double x, double y) {

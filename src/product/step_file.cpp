@@ -218,10 +218,13 @@ class Parser {
       v.kind = StepValue::Kind::List;
       v.items = read_list(depth + 1);
     } else if (std::isalpha(static_cast<unsigned char>(c)) != 0) {
-      read_name();
+      std::string type = read_name();
       skip();
       std::vector<StepValue> inner = read_list(depth + 1);
-      if (inner.size() == 1) return inner[0];
+      if (inner.size() == 1) {
+        if (inner[0].kind == StepValue::Kind::List) inner[0].text = std::move(type);
+        return std::move(inner[0]);
+      }
       v.kind = StepValue::Kind::List;
       v.items = std::move(inner);
     } else {

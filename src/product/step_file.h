@@ -11,7 +11,7 @@ struct StepValue {
   enum class Kind { Null, Number, Text, Word, Reference, List };
   Kind kind = Kind::Null;  // $ and * are Null
   double number = 0;       // of a Number; the id of a Reference
-  std::string text;        // UTF-8; a Word without its dots
+  std::string text;        // UTF-8; a Word without its dots; of a typed List its type, "IFCARCINDEX"
   std::vector<StepValue> items;
 
   int id() const { return kind == Kind::Reference ? static_cast<int>(number) : 0; }

@@ -327,6 +327,7 @@ export)
   expect 2 "$topple" export r/record.h5 --lsdyna -o t/x.k; has err "a record, not a plan"
   cp r/model.json own.json; expect 2 "$topple" export own.json --adams -o own.json; has err "written over"
   expect 2 "$topple" export own.json --adams -o own.acf; has err "ends in .adm"
+  expect 2 "$topple" export own.json --adams -o own.dat; has err "name it as an .adm"; [ ! -e own.dat ] || { echo "a dataset without its commands"; failures=$((failures + 1)); }
   cmp r/model.json own.json || failures=$((failures + 1))
   expect 2 "$topple" export nowhere.h5 --csv -o t; has err "nowhere.h5"
   ;;

@@ -5,6 +5,8 @@
 
 #include <array>
 #include <cmath>
+#include <sstream>
+#include <string>
 
 #include "adams_reader.h"
 #include "base/file.h"
@@ -252,6 +254,24 @@ TEST(Adams, NamesWhatItCannotSay) {
                          HasSubstr("a joint never comes off"), HasSubstr("a zone is elastic for ever"),
                          HasSubstr("gives back on unloading"), HasSubstr("only contact with the ground"),
                          HasSubstr("a charge takes its zone away at once")));
+}
+
+TEST(Adams, NoTwoOperatorsFollowEachOther) {
+  mbs::Model model = make_hinge();
+  mbs::SpringDamper spring;
+  spring.a = mbs::kGround, spring.b = {0};
+  spring.free_length = 1;
+  spring.spring = {mbs::Characteristic::Kind::Polynomial, 0, {0, 300, -200}, {}, {}};
+  spring.damper.rate = -2;
+  model.springs.push_back(spring);
+  const std::string text = to_adams(model, {}, "x").dataset;
+  EXPECT_THAT(text, HasSubstr("+(-200)*("));
+  EXPECT_THAT(text, HasSubstr(", -(-2)*(VR("));
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.front() == '!') continue;
+    for (const char* pair : {"--", "+-", "*-"}) EXPECT_THAT(line, testing::Not(HasSubstr(pair)));
+  }
 }
 
 TEST(Adams, EveryMovingBodyTouchesTheGroundBelowIt) {

@@ -135,5 +135,22 @@ TEST(LsDyna, KeepsChargesThatFail) {
   EXPECT_TRUE(read_deck(to_lsdyna(plan, w, map, 2)).fails_at.empty());
 }
 
+TEST(LsDyna, TitlesAreNoKeywordsAndEndWithACharacter) {
+  product::Plan plan = read(portal(charge("C-A1-0", "100 ms", "scatter = \"0 ms\"")));
+  collapse::ModelMap map;
+  const mbs::Model model = collapse::make_model(plan, collapse::default_knowledge(), map);
+  const Whole w = make_whole(plan, collapse::default_knowledge(), {}, model, map);
+  const auto title = [&](const std::string& given) {
+    plan.title = given;
+    const std::string text = to_lsdyna(plan, w, map, 2);
+    const size_t from = text.find("*TITLE\n") + 7;
+    return text.substr(from, text.find('\n', from) - from);
+  };
+  EXPECT_EQ(title("*NODE of the building"), " *NODE of the building");
+  EXPECT_EQ(title("$ it costs"), " $ it costs");
+  EXPECT_EQ(title(std::string(79, 'x') + "\u00e4y"), std::string(79, 'x')) << "two bytes do not fit";
+  EXPECT_EQ(title(std::string(78, 'x') + "\u00e4y"), std::string(78, 'x') + "\u00e4");
+}
+
 }  // namespace
 }  // namespace topple::farfield
