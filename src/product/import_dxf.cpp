@@ -170,6 +170,7 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
   std::vector<Outline> out;
   std::string section;
   bool in_polyline = false, in_vertex = false, has_y = true;
+  bool is_frame = false;  // the vertex only guides a spline
   Outline now;
   std::array<double, 2> centre{};  // of a circle
   double radius = 0;
@@ -178,8 +179,13 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
     now.lacks_y |= !has_y;
     has_y = true;
   };
+  const auto drop_frame = [&] {
+    if (is_frame && !now.corners.empty()) now.corners.pop_back(), now.bulges.pop_back(), now.heights.pop_back();
+    is_frame = false;
+  };
   const auto finish = [&] {
     end_corner();
+    drop_frame();
     if (entity == "CIRCLE") {  // two halves
       now.is_closed = true;
       now.corners = {{centre[0] - radius, centre[1]}, {centre[0] + radius, centre[1]}};
@@ -207,6 +213,7 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
         fail(name, p.line, "its entities have no ENDSEC", "the drawing was cut off; save or copy it again");
       if (in_polyline && (p.value == "VERTEX" || p.value == "SEQEND")) {
         end_corner();
+        drop_frame();
         in_vertex = p.value == "VERTEX";
         if (!in_vertex) {
           finish();
@@ -235,8 +242,7 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
       now.is_closed = (flags & 1) != 0;
       now.is_mesh = entity == "POLYLINE" && (flags & (16 | 64)) != 0;
     }
-    if (p.code == 70 && in_vertex && (std::atoi(p.value.c_str()) & 16) != 0 && !now.corners.empty())
-      now.corners.pop_back(), now.bulges.pop_back(), now.heights.pop_back();  // of the frame that a spline follows
+    if (p.code == 70 && in_vertex) is_frame = (std::atoi(p.value.c_str()) & 16) != 0;
     if (p.code == 10 && has_corner) {
       end_corner();
       now.corners.push_back({read_length(p, name), 0});

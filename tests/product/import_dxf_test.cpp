@@ -194,6 +194,14 @@ TEST(ImportDxfHeights, OfCornersThatDifferLeaveAnOutlineOut) {
   helix.insert(helix.find("0\nSEQEND"), "0\nVERTEX\n8\nH\n10\n20\n20\n30\n30\n8\n70\n32\n");
   EXPECT_THAT(make_site_text(drawing(flat + helix), "s.dxf", 1).report.missing,
               Contains("1 outlines that do not lie flat are left out"));
+  // a guide, its flag before or behind its place
+  const std::string bare = polyline_in_space("5");
+  for (const char* guide : {"70\n16\n10\n90\n20\n80\n30\n5\n", "10\n90\n20\n80\n30\n5\n70\n16\n"}) {
+    std::string guided = bare;
+    guided.insert(guided.find("0\nSEQEND"), std::string("0\nVERTEX\n8\nH\n") + guide);
+    EXPECT_EQ(make_site_text(drawing(guided), "s.dxf", 1).text, make_site_text(drawing(bare), "s.dxf", 1).text)
+        << guide;
+  }
   EXPECT_THROW((void)make_site_text(drawing(polyline_in_space("high")), "s.dxf", 1), InputError);
 }
 
