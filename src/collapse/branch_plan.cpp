@@ -1,5 +1,7 @@
 #include "collapse/branch_plan.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -72,6 +74,19 @@ void add_changes(const product::PlanChanges& more, product::PlanChanges& changes
   changes.cables.insert(changes.cables.end(), more.cables.begin(), more.cables.end());
 }
 
+/// Whether a cable of the branch was added and let go before the first step.
+bool added_and_let_go(const LiveModel& live, const std::string& name) {
+  const auto& applied = live.applied();
+  size_t cable = live.plan().cables.size();
+  for (const LiveModel::Applied& a : applied) cable -= a.edit.kind == Kind::AddCable;
+  bool is_added = false, is_let_go = false;
+  for (const LiveModel::Applied& a : applied) {
+    if (a.edit.kind == Kind::AddCable) is_added |= live.plan().cables[cable++].name == name && a.time <= 0;
+    if (a.edit.kind == Kind::RemoveCable) is_let_go |= a.edit.cable == name && a.time <= 0;
+  }
+  return is_added && is_let_go;
+}
+
 }  // namespace
 
 BranchPlan write_branch_plan(const LiveModel& live) {
@@ -88,7 +103,7 @@ BranchPlan write_branch_plan(const LiveModel& live) {
   for (const LiveModel::Applied& a : live.applied()) {
     const bool is_early = a.time <= 0;
     const char* later = "acts from a moment of the run on, which a plan cannot say";
-    std::string why;
+    std::string why, words = a.text;
     product::PlanChanges changes;
     switch (a.edit.kind) {
       case Kind::Fire:
@@ -109,6 +124,8 @@ BranchPlan write_branch_plan(const LiveModel& live) {
         const product::Cable& c = live.plan().cables[cable++];
         if (!is_early)
           why = later;
+        else if (added_and_let_go(live, c.name))
+          break;  // it has never pulled
         else if (!(c.strength > 0))
           why = "a cable of a plan has a strength";
         else
@@ -116,21 +133,28 @@ BranchPlan write_branch_plan(const LiveModel& live) {
         break;
       }
       case Kind::RemoveCable:
-        why = later;
-        break;
-      case Kind::SetFriction:
         if (!is_early)
           why = later;
-        else if (live.model().contact.friction != live.model().contact.body_friction)
-          why = "a plan has one friction for the ground and the parts";
+        else if (!added_and_let_go(live, a.edit.cable))
+          why = "the cable is the plan's own; take it out of its text";
+        break;
+      case Kind::SetFriction:
+        if (a.edit.bodies) {
+          const std::string parts = fmt::format("friction of the parts {:g}: ", *a.edit.bodies);
+          out.left_out.push_back(parts + (is_early ? "it is a rule, contact.body_friction" : later));
+          if (!a.edit.ground) continue;
+        }
+        words = fmt::format("friction of the ground {:g}", *a.edit.ground);
+        if (!is_early)
+          why = later;
         else
-          changes.friction = live.model().contact.friction;
+          changes.friction = a.edit.ground;
         break;
     }
     if (why.empty())
-      sayable.push_back({a.text, std::move(changes)});
+      sayable.push_back({words, std::move(changes)});
     else
-      out.left_out.push_back(a.text + ": " + why);
+      out.left_out.push_back(words + ": " + why);
   }
   if (sayable.empty()) return out;
   product::PlanChanges all;

@@ -164,16 +164,30 @@ class Editor {
     return out + "\n";
   }
 
-  /// Fuzzy paths count stages: their numbers must stay.
+  /// Fuzzy paths count stages and their charges: their numbers must stay.
   void check_numbers() const {
     const std::vector<Stage>& stages = *changes_.stages;
     bool stay = stages.size() >= plan_.stages.size();
     for (size_t s = 0; stay && s < plan_.stages.size(); ++s) stay = stages[s].where.line == plan_.stages[s].where.line;
-    if (stay) return;
     for (const auto& places : plan_.fuzzy.places)
-      for (const DocumentPath& p : places)
-        if (!p.empty() && p.front().key == "stage")
-          refuse("a stage would come before others, and [fuzzy] names stages by their numbers");
+      for (const DocumentPath& p : places) {
+        if (p.size() < 2 || p.front().key != "stage") continue;
+        if (!stay) refuse("a stage would come before others, and [fuzzy] names stages by their numbers");
+        if (p.size() >= 4 && p[2].key == "charge" && !keeps_charge(static_cast<size_t>(p[1].item), p[3].item))
+          refuse("a charge would come before others, or be gone, and [fuzzy] names charges by their numbers");
+      }
+  }
+  /// Whether a table of charges keeps its number in its stage; of stages that do.
+  bool keeps_charge(size_t stage, int number) const {
+    std::vector<std::pair<int, int>> places;  // of its tables, in their order
+    for (const Charge& c : before_.stages[stage].charges)
+      if (const std::pair place{c.where.line, c.where.column};
+          std::find(places.begin(), places.end(), place) == places.end())
+        places.push_back(place);
+    const std::vector<Table> tables = lay_out((*changes_.stages)[stage]);
+    const auto n = static_cast<size_t>(number);
+    return n < places.size() && n < tables.size() &&
+           std::pair{tables[n].charge.where.line, tables[n].charge.where.column} == places[n];
   }
 
   void replace_stages(std::string& behind) {

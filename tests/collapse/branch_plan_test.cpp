@@ -124,13 +124,42 @@ TEST(BranchPlan, TakesWhatWasDoneBeforeTheFirstStepOnly) {
   EXPECT_EQ(again.cables[0].stiffness, 2e6);
   EXPECT_EQ(again.members[static_cast<size_t>(again.find_member("C-B1-0"))].weakenings.at(0).cut_bars, 0.5);
   const BranchPlan late = write_branch_plan(edited(plan, {{0.1, cut}, {0.1, cable}, {0.1, friction}}));
-  EXPECT_EQ(late.left_out.size(), 3U);
+  EXPECT_EQ(late.left_out.size(), 4U);
   EXPECT_EQ(late.text, plan.text);
-  const BranchPlan two = write_branch_plan(edited(plan, {{0, R"({"command": "set_friction", "ground": 0.3})"},
-                                                         {0, R"({"command": "set_delay", "stage": 1, "time": 0.5})"}}));
-  EXPECT_EQ(two.taken.size(), 1U);
-  ASSERT_EQ(two.left_out.size(), 1U);
-  EXPECT_THAT(two.left_out[0], HasSubstr("one friction"));
+}
+
+TEST(BranchPlan, SaysTheFrictionOfTheGroundAlone) {
+  const product::Plan plan = staged();
+  const auto set = [](const char* values) { return std::string(R"({"command": "set_friction", )") + values + "}"; };
+  const BranchPlan ground = write_branch_plan(edited(plan, {{0, set(R"("ground": 0.3)")}}));
+  EXPECT_TRUE(ground.left_out.empty());
+  EXPECT_EQ(read(ground.text).ground.friction, 0.3);
+  const BranchPlan both = write_branch_plan(edited(plan, {{0, set(R"("ground": 0.3, "bodies": 0.4)")}}));
+  EXPECT_EQ(read(both.text).ground.friction, 0.3);
+  EXPECT_THAT(both.taken, testing::ElementsAre("friction of the ground 0.3"));
+  ASSERT_EQ(both.left_out.size(), 1U);
+  EXPECT_THAT(both.left_out[0], HasSubstr("friction of the parts 0.4: it is a rule"));
+  const BranchPlan parts = write_branch_plan(edited(plan, {{0, set(R"("bodies": 0.4)")}}));
+  EXPECT_TRUE(parts.taken.empty());
+  EXPECT_EQ(parts.text, plan.text);
+  // what comes later changes nothing of what was set first
+  const BranchPlan later =
+      write_branch_plan(edited(plan, {{0, set(R"("ground": 0.3)")}, {0.1, set(R"("ground": 0.2, "bodies": 0.2)")}}));
+  EXPECT_EQ(read(later.text).ground.friction, 0.3);
+  EXPECT_EQ(later.left_out.size(), 2U);
+}
+
+TEST(BranchPlan, ForgetsCablesThatNeverPull) {
+  const product::Plan plan = staged();
+  const std::string add = R"({"command": "add_cable", "member": "C-A2-1", "position": 1.5, "anchor": [-15, 4, 0],
+                          "stiffness": 2e6, "pretension": 5e4, "strength": 9e5})",
+                    let_go = R"({"command": "remove_cable", "cable": "added 1"})";
+  const BranchPlan never = write_branch_plan(edited(plan, {{0, add}, {0, let_go}}));
+  EXPECT_TRUE(never.left_out.empty());
+  EXPECT_TRUE(read(never.text).cables.empty());
+  const BranchPlan late = write_branch_plan(edited(plan, {{0, add}, {0.1, let_go}}));
+  EXPECT_EQ(read(late.text).cables.size(), 1U);
+  EXPECT_EQ(late.left_out.size(), 1U);
 }
 
 TEST(BranchPlan, KeepsWhatFuzzyPathsName) {
@@ -150,6 +179,28 @@ TEST(BranchPlan, KeepsWhatFuzzyPathsName) {
   ASSERT_EQ(before.left_out.size(), 1U);
   EXPECT_THAT(before.left_out[0], HasSubstr("[fuzzy]"));
   EXPECT_EQ(before.text, plan.text);
+}
+
+TEST(BranchPlan, KeepsNumbersOfChargesThatFuzzyPathsName) {
+  const std::string fuzzy = "[fuzzy]\nstage.2.charge.1.delay = { triangular = [\"0 ms\", \"0 ms\", \"30 ms\"] }\n";
+  const product::Plan plan = staged(fuzzy);
+  // all of its charges replaced by others: the first table would be that of the new ones
+  std::vector<std::pair<double, std::string>> edits;
+  const LiveModel live = edited(plan, {});
+  for (size_t i = 0; i < live.charges().size(); ++i) {
+    const LiveCharge& c = live.charges()[i];
+    if (c.stage != 1) continue;
+    const product::Charge& charge = live.charge(c);
+    edits.emplace_back(0, R"({"command": "remove_charge", "charge": )" + std::to_string(i) + "}");
+    edits.emplace_back(0, R"({"command": "add_charge", "member": ")" +
+                              plan.members[static_cast<size_t>(charge.member)].name +
+                              R"(", "position": 1.2, "destroyed_length": 0.6, "time": 0.7})");
+  }
+  ASSERT_FALSE(edits.empty());
+  const BranchPlan b = write_branch_plan(edited(plan, edits));
+  EXPECT_TRUE(b.taken.empty());
+  ASSERT_FALSE(b.left_out.empty());
+  EXPECT_THAT(b.left_out[0], HasSubstr("[fuzzy] names charges by their numbers"));
 }
 
 TEST(BranchPlan, LeavesOutWhatWouldBeNoPlan) {
