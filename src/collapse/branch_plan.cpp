@@ -154,7 +154,7 @@ BranchPlan write_branch_plan(const LiveModel& live) {
     if (why.empty())
       sayable.push_back({words, std::move(changes)});
     else
-      out.left_out.push_back(words + ": " + why);
+      out.left_out.push_back(fmt::format("{}: {}", words, why));
   }
   if (sayable.empty()) return out;
   product::PlanChanges all;
