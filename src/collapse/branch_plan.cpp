@@ -139,16 +139,16 @@ BranchPlan write_branch_plan(const LiveModel& live) {
           why = "the cable is the plan's own; take it out of its text";
         break;
       case Kind::SetFriction:
-        if (a.edit.bodies) {
-          const std::string parts = fmt::format("friction of the parts {:g}: ", *a.edit.bodies);
-          out.left_out.push_back(parts + (is_early ? "it is a rule, contact.body_friction" : later));
-          if (!a.edit.ground) continue;
-        }
-        words = fmt::format("friction of the ground {:g}", *a.edit.ground);
-        if (!is_early)
+        if (!is_early) {
           why = later;
-        else
-          changes.friction = a.edit.ground;
+          break;
+        }
+        if (a.edit.bodies)
+          out.left_out.push_back(
+              fmt::format("friction of the parts {:g}: it is a rule, contact.body_friction", *a.edit.bodies));
+        if (!a.edit.ground) continue;
+        words = fmt::format("friction of the ground {:g}", *a.edit.ground);
+        changes.friction = a.edit.ground;
         break;
     }
     if (why.empty())
