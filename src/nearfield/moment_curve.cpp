@@ -212,6 +212,12 @@ Interaction make_interaction(const Fibres& fibres, Axis axis, int direction, con
       out.peak_moment.push_back(most);
     }
   }
+  // an end has no yield where the force beside it has none
+  if (count > 2) {
+    std::vector<double>& yield = out.yield_moment;
+    if (std::isnan(yield[1])) yield.front() = nan;
+    if (std::isnan(yield[yield.size() - 2])) yield.back() = nan;
+  }
   return out;
 }
 

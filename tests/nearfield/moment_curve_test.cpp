@@ -161,6 +161,8 @@ TEST(MomentCurve, InteractionIsThePeaksOfCurves) {
       EXPECT_DOUBLE_EQ(all.yield_moment[k], c.yield_moment) << all.normal_force[k];
     }
   }
+  EXPECT_EQ(all.yield_moment.front(), 0) << "crushed evenly";
+  EXPECT_TRUE(std::isnan(all.yield_moment.back())) << "torn evenly, behind yield";
   EXPECT_GT(yielding, 0) << "near rupture the force alone makes the bars yield";
   EXPECT_GT(refined, 0) << "near rupture the moment rises until the force is lost";
 }
