@@ -753,9 +753,10 @@ class Reader {
       e.why = "its body has no volume";
       return;
     }
-    const double across = e.type == "IFCCOLUMN" ? size.y : size.z;
-    const double other = e.type == "IFCCOLUMN" ? size.x : std::min(size.x, size.y);
-    const bool is_stretched = e.is_round && std::abs(across - other) >= 0.02 * other;
+    const bool is_column = e.type == "IFCCOLUMN";
+    const double across = is_column ? size.y : size.z, other = is_column ? size.x : std::min(size.x, size.y);
+    const bool is_stretched =
+        e.is_round && (is_column || e.type == "IFCBEAM") && std::abs(across - other) >= 0.02 * other;
     if (is_stretched) e.is_round = false;
     const bool is_panel = e.type == "IFCWALL" || e.type == "IFCSLAB";
     if (e.type == "IFCSLAB") find_outlines(body, e);
@@ -791,6 +792,8 @@ class Reader {
       for (size_t j = 0; j < i; ++j) overlaps |= overlap(boxes[i], boxes[j]);
     constexpr size_t many = 50;
     if (!overlaps || solids.size() > many) return sum;
+    std::vector<Prism> prisms;
+    for (const Solid& solid : solids) prisms.emplace_back(solid);
     // by places in the middle of cells
     constexpr int cells = 32;
     const Vec3 cell = (1.0 / cells) * (high - low);
@@ -800,25 +803,34 @@ class Reader {
         for (int k = 0; k < cells; ++k) {
           const Vec3 own{low.x + (i + 0.5) * cell.x, low.y + (j + 0.5) * cell.y, low.z + (k + 0.5) * cell.z};
           const Vec3 p = turn_back(own);
-          inside += std::any_of(solids.begin(), solids.end(), [&](const Solid& s) { return contains(s, p); });
+          inside += std::any_of(prisms.begin(), prisms.end(), [&](const Prism& one) { return one.contains(p); });
         }
     return cell.x * cell.y * cell.z * inside;
   }
-  static bool contains(const Solid& solid, const Vec3& p) {
-    const Vec3 foot = solid.loops.front().front(), normal = calc_normal(solid.loops.front());
-    const double height = dot(solid.way, normal), t = dot(p - foot, normal) / height;
-    if (!(std::abs(height) > 0) || t < 0 || t > 1) return false;
-    // in axes of the profile
-    const Vec3 z = (1 / norm(normal)) * normal, aside = std::abs(z.x) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
-    const Vec3 x = (1 / norm(cross(z, aside))) * cross(z, aside), y = cross(z, x), q = p - t * solid.way - foot;
-    bool is_inside = false;
-    for (const Loop& loop : solid.loops) {
-      Loop flat;
-      for (const Vec3& c : loop) flat.push_back({dot(c - foot, x), dot(c - foot, y), 0});
-      is_inside ^= lies_within(flat, dot(q, x), dot(q, y));
+  /// A solid, its profile in the profile's own axes.
+  struct Prism {
+    explicit Prism(const Solid& solid) : foot(solid.loops.front().front()), way(solid.way) {
+      const Vec3 normal = calc_normal(solid.loops.front()), z = (1 / norm(normal)) * normal;
+      const Vec3 across = cross(z, std::abs(z.x) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0});
+      x = (1 / norm(across)) * across, y = cross(z, x);
+      per_height = (1 / dot(way, z)) * z;
+      for (const Loop& loop : solid.loops) {
+        flat.emplace_back();
+        for (const Vec3& c : loop) flat.back().push_back({dot(c - foot, x), dot(c - foot, y), 0});
+      }
     }
-    return is_inside;
-  }
+    bool contains(const Vec3& p) const {
+      const double t = dot(p - foot, per_height);
+      if (!(t >= 0 && t <= 1)) return false;
+      const Vec3 q = p - t * way - foot;
+      bool is_inside = false;
+      for (const Loop& loop : flat) is_inside ^= lies_within(loop, dot(q, x), dot(q, y));
+      return is_inside;
+    }
+
+    Vec3 foot, way, x, y, per_height;
+    std::vector<Loop> flat;
+  };
   /// Boxes of what is taken out of a wall. Cut, round and turned ones are not read.
   void find_openings(IfcElement& wall) const {
     if (wall.type != "IFCWALL" || !wall.has_opening) return;

@@ -96,4 +96,14 @@ inline void add_columns(Writer& w, const std::string& site, const std::function<
       for (const double y : {0.0, 5.0}) w.element("IFCCOLUMN", w.placement(site, x, y, 3 * s), make_body());
 }
 
+/// Columns of 40 cm x 40 cm, 3 m high, at the corners of 6 m x 5 m; their references, "#7,#12".
+inline std::string add_square_columns(Writer& w) {
+  std::string columns;
+  for (const double x : {0.0, 6.0})
+    for (const double y : {0.0, 5.0})
+      columns += (columns.empty() ? "" : ",") + w.element("IFCCOLUMN", w.placement("$", x, y, 0),
+                                                          w.shape("SweptSolid", w.extrusion(w.rectangle(0.4, 0.4), 3)));
+  return columns;
+}
+
 }  // namespace topple::product

@@ -151,11 +151,7 @@ TEST(ImportIfcBodies, OfWhichAPartIsNotReadAreLeftOut) {
 TEST(ImportIfcMaterials, OfConstituentsAreThatOfTheLargestShare) {
   Writer w;
   w.metres();
-  std::string columns;
-  for (const double x : {0.0, 6.0})
-    for (const double y : {0.0, 5.0})
-      columns += (columns.empty() ? "" : ",") + w.element("IFCCOLUMN", w.placement("$", x, y, 0),
-                                                          w.shape("SweptSolid", w.extrusion(w.rectangle(0.4, 0.4), 3)));
+  const std::string columns = add_square_columns(w);
   const auto constituent = [&](const char* name, const char* share) {
     return w.add(std::string("IFCMATERIALCONSTITUENT('c',$,") + w.add(std::string("IFCMATERIAL('") + name + "')") +
                  "," + share + ",$)");

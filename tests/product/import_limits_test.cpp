@@ -22,12 +22,7 @@ using testing::Not;
 Import import_of(const std::string& material) {
   Writer w;
   w.metres();
-  std::string columns;
-  for (const double x : {0.0, 6.0})
-    for (const double y : {0.0, 5.0})
-      columns += (columns.empty() ? "" : ",") + w.element("IFCCOLUMN", w.placement("$", x, y, 0),
-                                                          w.shape("SweptSolid", w.extrusion(w.rectangle(0.4, 0.4), 3)));
-  w.material(material, columns);
+  w.material(material, add_square_columns(w));
   return import("IFC4", w);
 }
 
