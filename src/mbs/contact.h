@@ -146,7 +146,8 @@ struct ShapeBounds {
 /// Who may be near whom; scratch of the search.
 struct PairSearch {
   bool has_links = false;
-  std::vector<int> first_link, link;  // bodies that each body is tied to
+  std::vector<size_t> grounded_elements, grounded_bushings, grounded_joints;  // tied to what does not move
+  std::vector<int> first_link, link;                                          // bodies that each body is tied to
   std::vector<int> first_link_before, link_before;
   std::vector<unsigned char> relinked;  // whether they are others than those before (B)
   std::vector<ShapeBounds> bounds;      // by place

@@ -695,13 +695,12 @@ void System::join_batch(Lanes& batch, size_t to) {
 
 Vec3 System::calc_element_reaction() const {
   Vec3 sum;
-  const auto grounded = [&](int b) { return b < 0 || fixed[static_cast<size_t>(b)]; };
   for (size_t e = 0; e < elements.size(); ++e) {
     const size_t slot = slot_of(e);
     if (slot == Lanes::kNoSlot || !state.element[e].live) continue;
     const Vec3 on_a{lanes->force_field(slot, 0), lanes->force_field(slot, 1), lanes->force_field(slot, 2)};
-    if (grounded(elements[e].a)) sum -= on_a;
-    if (grounded(elements[e].b)) sum += on_a;
+    if (is_grounded(elements[e].a)) sum -= on_a;
+    if (is_grounded(elements[e].b)) sum += on_a;
   }
   return sum;
 }

@@ -81,10 +81,27 @@ void System::add_travel(double h) {
   }
 }
 
+bool System::is_grounded(int body) const { return body < 0 || fixed[static_cast<size_t>(body)]; }
+
+void System::list_grounded_links() {
+  PairSearch& search = contact.search;
+  const auto list = [&](size_t count, std::vector<size_t>& grounded, auto&& ends_of) {
+    grounded.clear();
+    for (size_t i = 0; i < count; ++i) {
+      const auto [a, b] = ends_of(i);
+      if (is_grounded(a) || is_grounded(b)) grounded.push_back(i);
+    }
+  };
+  list(elements.size(), search.grounded_elements, [&](size_t e) { return std::pair(elements[e].a, elements[e].b); });
+  list(forces.bushings.size(), search.grounded_bushings,
+       [&](size_t i) { return std::pair(forces.bushings[i].a, forces.bushings[i].b); });
+  list(joints.size(), search.grounded_joints, [&](size_t j) { return std::pair(joints[j].parent, joints[j].child); });
+}
+
 void System::find_links() {
   State& s = state;
   PairSearch& search = contact.search;
-  const bool had_links = search.has_links, meets = model.contact.bodies;
+  const bool had_links = search.has_links;
   search.has_links = true;
   s.links_due = false;
   search.first_link_before.swap(search.first_link);
@@ -92,7 +109,23 @@ void System::find_links() {
   const std::vector<unsigned char> tied = s.tied_to_ground;
   std::fill(s.tied_to_ground.begin(), s.tied_to_ground.end(), 0);
   std::fill(s.ground_clear.begin(), s.ground_clear.end(), 0);
-  const auto grounded = [&](int x) { return x < 0 || fixed[static_cast<size_t>(x)]; };
+  if (!had_links) list_grounded_links();
+  const auto tie = [&](int body) {
+    if (body >= 0) s.tied_to_ground[static_cast<size_t>(body)] = 1;
+  };
+  const auto tie_ends = [&](int a, int b) {
+    if (is_grounded(a)) tie(b);
+    if (is_grounded(b)) tie(a);
+  };
+  for (const size_t e : search.grounded_elements)
+    if (s.element[e].live) tie_ends(elements[e].a, elements[e].b);
+  for (const size_t i : search.grounded_bushings)
+    if (s.bushing[i].live) tie_ends(forces.bushings[i].a, forces.bushings[i].b);
+  for (const size_t j : search.grounded_joints)
+    if (s.joint[j].live) tie_ends(joints[j].parent, joints[j].child);
+  for (size_t b = 0; b < B; ++b)
+    if (s.tied_to_ground[b] != tied[b]) pack_ground_box(b);
+  if (!model.contact.bodies) return;  // nobody asks who is tied to whom
   const auto each_link = [&](auto&& f) {
     for (size_t e = 0; e < elements.size(); ++e)
       if (s.element[e].live) f(elements[e].a, elements[e].b);
@@ -103,15 +136,10 @@ void System::find_links() {
   };
   search.first_link.assign(B + 2, 0);
   each_link([&](int a, int b) {
-    if (grounded(a) && b >= 0) s.tied_to_ground[static_cast<size_t>(b)] = 1;
-    if (grounded(b) && a >= 0) s.tied_to_ground[static_cast<size_t>(a)] = 1;
-    if (!meets || a < 0 || b < 0) return;
+    if (a < 0 || b < 0) return;
     ++search.first_link[static_cast<size_t>(a) + 2];
     ++search.first_link[static_cast<size_t>(b) + 2];
   });
-  for (size_t b = 0; b < B; ++b)
-    if (s.tied_to_ground[b] != tied[b]) pack_ground_box(b);
-  if (!meets) return;  // nobody asks who is tied to whom
   for (size_t b = 2; b < B + 2; ++b) search.first_link[b] += search.first_link[b - 1];
   search.link.resize(static_cast<size_t>(search.first_link[B + 1]));
   each_link([&](int a, int b) {
@@ -373,6 +401,7 @@ PairDue System::make_pair_due(const HeldPair& pair) const {
 void System::release_pairs() {
   State& s = state;
   find_links();
+  if (s.held_pairs.empty()) return;
   NearBodies are_near(contact.search, fixed);
   size_t kept = 0;
   const std::vector<unsigned char>& relinked = contact.search.relinked;

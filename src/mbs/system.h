@@ -474,6 +474,8 @@ class System {
   void add_travel(double h);
   /// Bodies whose shapes are near each other, and who is tied to the ground.
   void find_pairs();
+  bool is_grounded(int body) const;
+  void list_grounded_links();
   void find_links();
   /// Makes pairs of held ones whose links have ended.
   void release_pairs();
