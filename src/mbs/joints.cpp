@@ -222,7 +222,8 @@ void System::build_clusters() {
   }
   pack_pairs();
   joint_rows.resize(most_rows);
-  for (std::vector<double>* x : {&joint_gaps, &joint_rhs, &joint_impulse, &joint_linear, &joint_answer, &joint_change})
+  for (std::vector<double>* x : {&joint_gaps, &joint_rhs, &joint_impulse, &joint_linear, &joint_answer, &joint_change,
+                                 &joint_unforeseen, &joint_left_before, &joint_rate})
     x->resize(most_rows);
   clusters_due = false;
 }
@@ -384,18 +385,26 @@ double System::find_gaps(const JointCluster& c, double h) {
 
 bool System::close_cluster(JointCluster& c, double h, bool from_before) {
   const size_t n = static_cast<size_t>(c.matrix.rows());
-  predict_cluster(c, h);
-  c.matrix.solve(joint_rhs.data());
-  for (size_t i = 0; i < c.joints.size(); ++i) {
-    const size_t joint = static_cast<size_t>(c.joints[i]);
-    const size_t at = static_cast<size_t>(c.matrix.first_row(static_cast<int>(i)));
-    for (int r = 0; r < joints[joint].rows; ++r) {
-      const size_t row = at + static_cast<size_t>(r);
-      joint_linear[row] = joint_rhs[row];
-      if (from_before) joint_rhs[row] += state.joint[joint].curvature[r] / (r < joints[joint].lines ? 1 : c.length);
-      joint_impulse[row] = joint_rhs[row];
+  // The part of the last step that the linear one does not know is kept as rates. Impulses along the axes of that step
+  // would turn a light body between heavy ones by what little of them lies across it now.
+  const bool by_rates = c.joints.size() > 1;
+  const auto each_row = [&](auto&& f) {
+    for (size_t i = 0; i < c.joints.size(); ++i) {
+      const size_t joint = static_cast<size_t>(c.joints[i]);
+      const size_t at = static_cast<size_t>(c.matrix.first_row(static_cast<int>(i)));
+      for (int r = 0; r < joints[joint].rows; ++r)
+        f(at + static_cast<size_t>(r), from_before ? state.joint[joint].curvature[r] : 0,
+          r < joints[joint].lines ? 1 : c.length);
     }
-  }
+  };
+  predict_cluster(c, h);
+  if (by_rates) each_row([&](size_t row, double before, double) { joint_rhs[row] += joint_unforeseen[row] = before; });
+  c.matrix.solve(joint_rhs.data());
+  each_row([&](size_t row, double before, double scale) {
+    joint_linear[row] = joint_rhs[row];
+    if (!by_rates) joint_rhs[row] += before / scale;
+    joint_impulse[row] = joint_rhs[row];
+  });
   for (int round = 0; round < kMostRounds; ++round) {
     apply_impulses(c, joint_rhs);
     c.open = find_gaps(c, h);
@@ -403,6 +412,7 @@ bool System::close_cluster(JointCluster& c, double h, bool from_before) {
     for (size_t r = 0; r < n; ++r) left = std::max(left, std::abs(joint_rhs[r]));
     if (left * h < c.tolerance) return true;
     if (!std::isfinite(left)) return false;
+    joint_left.assign(joint_rhs.begin(), joint_rhs.begin() + static_cast<std::ptrdiff_t>(n));
     c.matrix.solve(joint_rhs.data());
     // where one direction answers otherwise than the matrix says, as it does near singular positions, a secant finds it
     double above = 0, below = 0;
@@ -414,11 +424,14 @@ bool System::close_cluster(JointCluster& c, double h, bool from_before) {
     }
     const double share = below > 0 ? above / below : 0;
     for (size_t r = 0; r < n; ++r) {
-      const double answer = joint_rhs[r];
+      const double answer = joint_rhs[r], rate = joint_left[r];
       joint_rhs[r] -= share * (joint_change[r] + answer - joint_answer[r]);
       joint_answer[r] = answer;
       joint_change[r] = joint_rhs[r];
       joint_impulse[r] += joint_rhs[r];
+      joint_rate[r] = rate - share * (joint_rate[r] + rate - joint_left_before[r]);
+      joint_left_before[r] = rate;
+      joint_unforeseen[r] += joint_rate[r];
     }
   }
   return false;
@@ -499,8 +512,8 @@ void System::solve_cluster(JointCluster& c, double h) {
       if (r >= j.lines) js.moment += f * joint_rows[row].turn_child;
       turn_child += f * joint_rows[row].turn_child;
       turn_parent += f * joint_rows[row].turn_parent;
-      js.curvature[r] =
-          regular && !is_pulled ? (joint_impulse[row] - joint_linear[row]) * (r < j.lines ? 1 : c.length) : 0;
+      const double of_one = (joint_impulse[row] - joint_linear[row]) * (r < j.lines ? 1 : c.length);
+      js.curvature[r] = !regular || is_pulled ? 0 : c.joints.size() > 1 ? joint_unforeseen[row] : of_one;
     }
     if (moving(j.child)) {
       joint_force[static_cast<size_t>(j.child)] += js.force;

@@ -64,7 +64,9 @@ struct JointState {
   double known_angle = 0, known_cosine = 1, known_sine = 0;
   unsigned char repeating = 0;  // rows that repeat those of other joints, bit r for row r
   bool is_examined = false;     // repeating is known
-  double curvature[6] = {};     // the part of the last impulse that the linear step does not know [N·s, N·m·s]
+  // What the linear step did not know of the last one: of a joint between bodies that have no other an impulse
+  // [N·s, N·m·s], of others the rates that it left open [m/s], those of rotations times the cluster's length.
+  double curvature[6] = {};
 };
 
 /// An event that fires in this step.
@@ -273,7 +275,8 @@ class System {
   std::string identity;                   // of the model, for snapshots
   std::vector<JointRow> joint_rows;
   std::vector<double> joint_gaps, joint_rhs, joint_impulse, joint_linear, joint_answer, joint_change;
-  std::vector<Vec3> v_before, L_before, w_before;       // of jointed bodies (B)
+  std::vector<double> joint_unforeseen, joint_rate, joint_left, joint_left_before;  // as rates of the rows
+  std::vector<Vec3> v_before, L_before, w_before;                                   // of jointed bodies (B)
   std::vector<Vec3> joint_spin;                         // of jointed bodies in the middle of the step (B)
   std::vector<Vec3> reaction_force, reaction_moment;    // at the time of the positions, of a view, in W (J)
   std::vector<Vec3> body_reaction, body_reaction_turn;  // their sums on bodies (B)

@@ -160,5 +160,34 @@ TEST(JointReference, TwoRodsReleasedFromTheHorizontal) {
   EXPECT_LT(s.joint_drift, 1e-11);
 }
 
+TEST(JointReference, ALightLinkBetweenTheGroundAndAHeavyBody) {
+  // a double pendulum let go from the horizontal; by Lagrange's equations in both angles (Runge and Kutta, h = 1e-5)
+  const struct {
+    double mass, x, z;
+  } cases[] = {
+      {10, -1.134507552, -0.981241607}, {1e-2, -1.134503755, -0.981245920}, {1e-4, -1.134503751, -0.981245924}};
+  for (const auto& c : cases) {
+    Model m = empty_model();
+    Body link;
+    link.name = "link", link.mass = c.mass, link.inertia = Mat3::diagonal({1e-6, 1e-6, 1e-6});
+    link.X_WB.p = {0.5, 0, 0};
+    add_body(m, link);
+    Body bob;
+    bob.name = "bob", bob.mass = 1e6, bob.inertia = Mat3::diagonal({1e5, 1e5, 1e5});
+    bob.X_WB.p = {1.5, 0, 0};
+    add_body(m, bob);
+    test::pin(m, kGround, {0}, {0, 0, 0}), test::pin(m, {0}, {1}, {1, 0, 0});
+    for (const double h : {1e-3, 5e-4}) {
+      Vec3 end;
+      const Summary s = run_to(m, h, {1}, [&](size_t, const View& v) { end = v.X_WB[1].p; });
+      EXPECT_EQ(s.ending, Summary::Ending::TimeLimit) << c.mass << ' ' << s.message;
+      EXPECT_TRUE(s.notes.empty()) << c.mass << ' ' << s.notes.front();
+      EXPECT_LT(s.joint_drift, 1e-11) << c.mass;
+      EXPECT_NEAR(end.x, c.x, 12 * h * h) << c.mass;
+      EXPECT_NEAR(end.z, c.z, 12 * h * h) << c.mass;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace topple::mbs
