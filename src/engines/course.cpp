@@ -336,6 +336,10 @@ bool Course::fire_events() {
     const mbs::Event& e = model_.events[i];
     const bool holds =
         time_ + late >= e.time && std::any_of(e.triggers.begin(), e.triggers.end(), [&](const mbs::Trigger& t) {
+          // a joint that is gone has no angle and no displacement
+          const bool is_of_motion = t.quantity.kind == mbs::Quantity::Kind::JointAngle ||
+                                    t.quantity.kind == mbs::Quantity::Kind::JointDisplacement;
+          if (is_of_motion && joint_live_[static_cast<size_t>(t.quantity.index)] == 0) return false;
           const double value = mbs::calc_component(t.quantity, t.component, calc_view());
           return t.rising ? value >= t.limit : value <= t.limit;
         });

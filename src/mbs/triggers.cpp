@@ -1,15 +1,18 @@
 /// Events that wait for a limit. Places, lengths and angles are those of the present step; forces, moments and
 /// velocities those of the evaluation before, as joints are judged by their last reaction. Of what is released or
-/// loosened they see what System::look() shows.
+/// loosened they see what System::look() shows, but no angle and no displacement of a joint that is gone.
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "mbs/system.h"
 
 namespace topple::mbs {
 
 namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 double component_of(const Vec3& x, int component) { return component < 3 ? x[component] : norm(x); }
 double component_of(double x, int component) { return component < 3 ? x : std::abs(x); }
@@ -59,9 +62,10 @@ double System::calc_component(const Quantity& q, int component) {
       return component_of(transpose_times(F, is_force ? s.joint[i].force : s.joint[i].moment), component);
     }
     case Quantity::Kind::JointAngle:
-      return s.joint[i].live ? component_of(s.joint[i].angle, component) : 0;
+      // a joint that is gone has none: no limit holds
+      return s.joint[i].live ? component_of(s.joint[i].angle, component) : kNone;
     case Quantity::Kind::JointDisplacement: {
-      if (!s.joint[i].live) return 0;
+      if (!s.joint[i].live) return kNone;
       const CompiledJoint& j = joints[i];
       const Vec3 gap = calc_point(j.child, j.p_CM) - calc_point(j.parent, j.p_PF);
       return component_of(dot((rotation_of(j.parent) * j.R_PF).column(2), gap), component);

@@ -284,8 +284,8 @@ TEST(Trigger, FiresInTheOrderOfTheModelWithinAStep) {
   EXPECT_EQ(order, "cabde");
 }
 
-TEST(Trigger, OfAReleasedJointSeesWhatOutputsShow) {
-  // no angle and no displacement, however the body falls
+TEST(Trigger, OnTheMotionOfAReleasedJointNeverHolds) {
+  // it has neither angle nor displacement, and did not come back to 0
   for (const bool slides : {false, true}) {
     Model m;
     m.contact.ground = m.contact.bodies = false;
@@ -319,7 +319,7 @@ TEST(Trigger, OfAReleasedJointSeesWhatOutputsShow) {
       if (v.time > 0.3) { EXPECT_EQ((slides ? v.joint_displacement : v.joint_angle)[0], 0); }
     };
     (void)run(m, o);
-    EXPECT_EQ(fired, std::vector<std::string>{"none"}) << slides;
+    EXPECT_TRUE(fired.empty()) << slides << ' ' << fired.front();
   }
 }
 
