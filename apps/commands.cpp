@@ -188,7 +188,17 @@ void make_folder(const std::string& path, const std::vector<const char*>& files)
       throw std::runtime_error(file.string() + " is a folder, where a file is to be written");
 }
 
-void make_run_folder(const std::string& path) { make_folder(path, {"model.json", "record.h5", "report.html"}); }
+RunFolder::RunFolder(const std::string& path) {
+  std::error_code failure;
+  for (fs::path p = fs::absolute(path); !p.empty() && !fs::exists(p, failure); p = p.parent_path())
+    if (p.has_filename()) new_.push_back(p.string());  // not of a slash at its end
+  make_folder(path, {"model.json", "record.h5", "report.html"});
+}
+
+RunFolder::~RunFolder() {
+  std::error_code ignored;  // what is not empty stays
+  for (const std::string& path : new_) fs::remove(path, ignored);
+}
 
 Files write_files(const record::Record& r, const Arguments& a, bool& failed_report) {
   Files files;
@@ -373,7 +383,7 @@ int run_plan_file(const Arguments& a, const std::atomic<bool>& cancel) {
     const collapse::Knowledge knowledge = load_knowledge(a);
     print_diagnostics(warnings, text);
     if (!a.json) warnings.clear();  // they have been said
-    make_run_folder(a.output);
+    const RunFolder folder(a.output);
     ProgressLine progress;
     EventPrinter events(out, a.verbose, progress);
     Files files;

@@ -60,7 +60,6 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
   std::vector<Diagnostic> warnings;
   std::string text;
   std::FILE* out = a.json ? stderr : stdout;
-  bool is_new = false;  // the folder of results
   try {
     const collapse::RunOptions options = make_plan_options(a, "--until");
     const farfield::FeOptions fe = make_fe_options(a);
@@ -90,8 +89,7 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
       if (a.json) std::printf("%s\n", dump({{"exit_code", kOk}, {"mesh", mesh}}).c_str());
       return kOk;
     }
-    is_new = !std::filesystem::exists(a.output);
-    make_run_folder(a.output);
+    const RunFolder folder(a.output);
     ProgressLine progress;
     EventPrinter events(out, a.verbose, progress);
     collapse::RunCallbacks callbacks;
@@ -126,11 +124,7 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
                    contact / elements);
     if (r.ending == "cancelled" && has_checkpoint) tell_how_to_go_on(out, a, "fe", write_options(a));
     return code;
-  } catch (const InputError& e) {
-    std::error_code ignored;  // what is not empty stays
-    if (is_new) std::filesystem::remove(a.output, ignored);
-    return refuse(e, warnings, text, a.json);
-  }
+  } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }
 }
 
 }  // namespace topple::apps

@@ -118,7 +118,7 @@ int run_model_file(const Arguments& a, const std::atomic<bool>& cancel) {
     options.equilibrium = a.equilibrium.value_or(settings.equilibrium.value_or(true));
     if (options.equilibrium) mbs::refuse_velocities(model, text, a.input);
     options.rest_speed = settings.rest_speed.value_or(0);
-    make_run_folder(a.output);
+    const RunFolder folder(a.output);
     print_model(out, model);
     ProgressLine progress;
     EventPrinter events(out, a.verbose, progress);

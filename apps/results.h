@@ -75,8 +75,17 @@ void refuse_file(const std::string& path);
 /// As refuse_file(), and throws std::runtime_error with the path if there is no folder that
 /// can be written to, or a folder in the place of one of the files that are to come.
 void make_folder(const std::string& path, const std::vector<const char*>& files = {});
-/// The same for the files of a run.
-void make_run_folder(const std::string& path);
+/// The folder of a run, made as by make_folder(). What of it is new goes again with this, where nothing is in it.
+class RunFolder {
+ public:
+  explicit RunFolder(const std::string& path);
+  ~RunFolder();
+  RunFolder(const RunFolder&) = delete;
+  RunFolder& operator=(const RunFolder&) = delete;
+
+ private:
+  std::vector<std::string> new_;  // the innermost first
+};
 
 /// A built page, such as "report.html": beside an installed program, or in the source tree.
 std::optional<std::string> find_bundle(const std::string& name);

@@ -65,7 +65,7 @@ void print_outcomes(std::FILE* out, const Problem& p, const StudyResult& r) {
     const bool is_open =
         print_degrees(out, study::words_of_outcome(r, c.outcome), study::possibility_of(r, c),
                       study::is_possibility_converged(r, c), uncertainty::calc_necessity(r.possibilities, c.outcome),
-                      uncertainty::is_necessity_converged(r.possibilities, c.outcome), c.count);
+                      study::is_necessity_converged(p, r, c.outcome), c.count);
     has_open = has_open || is_open;
   }
   for (const std::string& name : study::list_unmet_outcomes(p, r)) {
@@ -211,7 +211,7 @@ void print_boxes(std::FILE* out, const Problem& p, const StudyResult& r) {
                                                  p.space.inputs[i].width() / p.inputs[i].unit_value),
                           study::words_of_value(p.inputs[i], b.box.upper[i], p.space.inputs[i].width()));
     print_line(out, text);
-    print_line(out, study::tell_guarantee(b, p.space.has_interaction()));
+    print_line(out, study::tell_guarantee(b, d.forbidden + d.failed, p.space.has_interaction()));
   }
 }
 

@@ -217,6 +217,8 @@ struct Builder : BuilderState {
   /// A wall that is one body with the beam under it, in a condensed model.
   bool is_cast_on_beam(int wall) const;
   void complain(int member, const std::string& what, const std::string& help = {});
+  /// At the place of the charge on it there, if there is one; the member's otherwise.
+  void complain_of_charge(int member, double position, const std::string& what, const std::string& help = {});
 };
 
 /// Axes of the members' frames as columns of R_WF: x along the member.

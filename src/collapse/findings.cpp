@@ -99,30 +99,22 @@ std::pair<double, double> calc_distances_at_end(const Context& c, size_t body, c
   return {least, most};
 }
 
-/// Decimals that an angle that was asked for needs.
-int find_digits(double angle) {
-  constexpr int most = 6;
-  int digits = 0;
-  const double degrees = angle / unit::deg;
-  for (double scale = 1; digits < most && std::abs(std::round(degrees * scale) / scale - degrees) > 1e-9; scale *= 10)
-    ++digits;
-  return digits;
-}
-
 std::string fixed_words(double value, int digits) { return fmt::format("{:.{}f}", value, digits); }
 
-std::string azimuth_words(double azimuth, int digits = 0) {
-  double degrees = azimuth / unit::deg;
-  if (degrees < -0.5) degrees += 360;
-  return fmt::format("{:.{}f} deg", degrees, digits);
-}
-
-/// A number and its limit, with as many digits as show which is larger.
-std::pair<std::string, std::string> tell_apart(double value, double limit, int digits = 1) {
+/// Two numbers, with as many digits as show which is larger.
+std::pair<std::string, std::string> tell_apart(double value, double limit, int digits) {
   constexpr int most = 6;
   const auto tell = [&digits](double v) { return fmt::format("{:.{}f}", v, digits); };
   while (value != limit && tell(value) == tell(limit) && digits < most) ++digits;
   return {tell(value), tell(limit)};
+}
+
+/// A length and its limit, with at least the digits that the limit was given with [m].
+std::pair<std::string, std::string> tell_beside_limit(double value, double limit) {
+  int digits = 1;
+  const auto is_rounded = [&] { return std::abs(std::stod(fmt::format("{:.{}f}", limit, digits)) - limit) > 1e-9; };
+  while (digits < 4 && std::isfinite(limit) && is_rounded()) ++digits;
+  return tell_apart(value, limit, digits);
 }
 
 /// Significant digits without an exponent: "0.0026", "1.3", "360".
@@ -368,22 +360,43 @@ void add_rolling_rings(const Context& c) {
 Reach add_debris(const Context& c, const Mechanism& m) {
   const size_t last = c.r.time.size() - 1;
   Reach reach = calc_reach(c.r, last);
+  const double planned = std::atan2(c.map.fall_direction.y, c.map.fall_direction.x);
   if (std::isnan(m.azimuth)) {
     c.add("azimuth", "Fall and debris", "Direction of fall",
           "The mass centre moved by less than half a metre to any side.", kNone, "rad");
+  } else if (!m.falls.empty()) {
+    std::string text = "Of separate structures one by one (0 deg is +x, counter-clockwise).";
+    for (const Fall& f : m.falls) {
+      if (std::isnan(f.azimuth)) {
+        text += fmt::format(" The mass centre of {} moved by less than half a metre to any side.", f.structure);
+        continue;
+      }
+      const std::string way = record::tell_azimuth(f.azimuth);
+      text += f.is_azimuth_of_lean ? fmt::format(" At {:.2f} s {} leans towards {}", f.time, f.structure, way)
+                                   : fmt::format(" The mass centre of {} moved towards {}", f.structure, way);
+      if (c.map.is_direction_planned) {
+        Mechanism one;
+        one.azimuth = f.azimuth;
+        const int digits = record::count_digits_of_angle(planned);
+        text +=
+            fmt::format(", {} deg from the planned {}", fixed_words(calc_deviation(one, planned) / unit::deg, digits),
+                        record::tell_azimuth(planned, digits));
+      }
+      text += ".";
+    }
+    c.add("azimuth", "Fall and debris", "Direction of fall", text, m.azimuth, "rad");
   } else {
-    const double planned = std::atan2(c.map.fall_direction.y, c.map.fall_direction.x);
     std::string text = m.is_azimuth_of_lean ? fmt::format("At {:.2f} s the upper block leans towards {}", m.time,
-                                                          azimuth_words(m.azimuth))
-                                            : "The mass centre moved towards " + azimuth_words(m.azimuth);
+                                                          record::tell_azimuth(m.azimuth))
+                                            : "The mass centre moved towards " + record::tell_azimuth(m.azimuth);
     if (c.map.is_direction_planned)
       text += fmt::format(", {} deg from the planned {}",
-                          fixed_words(calc_deviation(m, planned) / unit::deg, find_digits(planned)),
-                          azimuth_words(planned, find_digits(planned)));
+                          fixed_words(calc_deviation(m, planned) / unit::deg, record::count_digits_of_angle(planned)),
+                          record::tell_azimuth(planned, record::count_digits_of_angle(planned)));
     text += " (0 deg is +x, counter-clockwise).";
     if (m.is_azimuth_of_lean)
       text += fmt::format(" The mass centre moved by {:.1f} m towards {}.", norm(m.run),
-                          azimuth_words(std::atan2(m.run.y, m.run.x)));
+                          record::tell_azimuth(std::atan2(m.run.y, m.run.x)));
     c.add("azimuth", "Fall and debris", "Direction of fall", text, m.azimuth, "rad");
   }
   std::string text = fmt::format(
@@ -430,8 +443,8 @@ void add_clearances(const Context& c) {
   for (const product::Neighbour& n : c.plan.neighbours) {
     const Approach a = find_approach(c.r, n.footprint, c.cancel);
     const std::string lowest_who = c.r.bodies[a.lowest_body].name;
-    const bool asked = n.clearance.has_value();
-    const auto [distance, limit] = tell_apart(a.least, n.clearance.value_or(kNone));
+    const bool asked = n.clearance.has_value(), is_over = std::isfinite(a.lowest);
+    const auto [distance, limit] = tell_beside_limit(a.least, n.clearance.value_or(kNone));
     std::string text =
         a.when <= c.r.time.front()
             ? fmt::format("{} stands {} m away from the start, and nothing has come nearer", standing_name(c, a.body),
@@ -441,12 +454,12 @@ void add_clearances(const Context& c) {
       text = a.lowest_when <= c.r.time.front()
                  ? fmt::format("{} stands on it from the start", standing_name(c, a.lowest_body))
                  : fmt::format("{} lands on it at {:.2f} s", lowest_who, a.lowest_when);
-    else if (a.least <= 0)
+    else if (is_over)
       text = fmt::format(
           "Nothing lands on it, but parts are over it: {} comes down to {:.1f} m above the ground there, at {:.2f} s",
           lowest_who, a.lowest, a.lowest_when);
     if (asked) text += fmt::format("; the limit is {} m", limit);
-    const bool is_reached = a.least <= 0, lands = a.lowest <= kOnGround;
+    const bool is_reached = is_over, lands = a.lowest <= kOnGround;
     const bool is_broken = asked && (a.least < *n.clearance || lands);
     const std::string why = !asked || is_broken ? "" : find_what_is_open(c, [&](const OpenPart& part) {
       return calc_distances_at_end(c, part.body, n.footprint).first - part.way < *n.clearance;
@@ -596,11 +609,16 @@ void add_touchdown(const Context& c) {
     for (const Touchdown& d : all) order.push_back(&d), energy += d.energy, momentum += d.momentum;
     std::stable_sort(order.begin(), order.end(),
                      [](const Touchdown* a, const Touchdown* b) { return a->energy > b->energy; });
-    std::string text = fmt::format(
-        "{} parts touch the ground for the first time between {:.2f} s and {:.2f} s, with {} and {} "
-        "downwards in all (each part alone, as it touches). Largest:",
-        all.size(), all.front().time, all.back().time, record::tell_measure(energy, "J", 1),
-        record::tell_measure(momentum, "N s", 2));
+    const std::string falls = record::tell_measure(energy, "J", 1), pushes = record::tell_measure(momentum, "N s", 2);
+    std::string text =
+        all.size() == 1
+            ? fmt::format(
+                  "One part touches the ground for the first time, at {:.2f} s, with {} and {} downwards. It is:",
+                  all.front().time, falls, pushes)
+            : fmt::format(
+                  "{} parts touch the ground for the first time between {:.2f} s and {:.2f} s, with {} and {} "
+                  "downwards in all (each part alone, as it touches). Largest:",
+                  all.size(), all.front().time, all.back().time, falls, pushes);
     for (size_t i = 0; i < std::min(order.size(), kShownTouchdowns); ++i)
       text += fmt::format("{} {} at {:.2f} s at ({:.1f}, {:.1f}) m with {} and {}", i > 0 ? ";" : "",
                           c.r.bodies[static_cast<size_t>(order[i]->body)].name, order[i]->time, order[i]->place[0],
@@ -659,6 +677,13 @@ void add_rigid_block(const Context& c) {
   }
   centre *= 1 / block.mass;
   block.ahead = dot(centre - pivot, d);
+  // a shaft falls to its mouth, over the ring behind it
+  const Vec3 aside = centre - pivot - block.ahead * d;
+  if (is_shaft && std::hypot(aside.x, aside.y) > kSkew * std::abs(block.ahead)) {
+    c.add("rigid_block", "Mechanism", "Beside a rigid block",
+          "No comparison: the mouth does not lie in the planned direction.", kNone, "rad");
+    return;
+  }
   block.above = (centre - pivot).z;
   const double share = -block.mass * block.gravity / static_cast<double>(row.size());
   for (const GroundColumn* g : row) {
@@ -678,16 +703,30 @@ void add_rigid_block(const Context& c) {
                         calc_rigid_block(block, c.r.time)};
   const double when = block.release + 1;
   const double tons = block.mass / unit::t, moment = block.plastic_moment * 1e-6;  // [t, MNm]
-  const std::string model_words =
-      row.size() == 1
-          ? fmt::format(
-                "a rigid block in its place ({:.0f} t on a plastic hinge of {:.2f} MNm, its mass centre {:.2f} m ahead "
-                "of it)",
-                tons, moment, block.ahead)
-          : fmt::format(
-                "a rigid block in its place ({:.0f} t on {} plastic hinges of {:.2f} MNm in all, its mass centre "
-                "{:.2f} m ahead of them)",
-                tons, row.size(), moment, block.ahead);
+  // literals as wholes, as they are translated
+  const auto words = [&]() -> std::string {
+    const double way = std::abs(block.ahead);
+    if (row.size() == 1 && block.ahead < 0)
+      return fmt::format(
+          "a rigid block in its place ({:.0f} t on a plastic hinge of {:.2f} MNm, its mass centre {:.2f} m behind it)",
+          tons, moment, way);
+    if (row.size() == 1)
+      return fmt::format(
+          "a rigid block in its place ({:.0f} t on a plastic hinge of {:.2f} MNm, its mass centre {:.2f} m ahead of "
+          "it)",
+          tons, moment, way);
+    if (block.ahead < 0)
+      return fmt::format(
+          "a rigid block in its place ({:.0f} t on {} plastic hinges of {:.2f} MNm in all, its mass centre {:.2f} m "
+          "behind them)",
+          tons, row.size(), moment, way);
+    return fmt::format(
+        "a rigid block in its place ({:.0f} t on {} plastic hinges of {:.2f} MNm in all, its mass centre {:.2f} m "
+        "ahead "
+        "of them)",
+        tons, row.size(), moment, way);
+  };
+  const std::string model_words = words();
   const std::string hinge_words = row.size() == 1
                                       ? "Its hinge does not give before it yields, unlike a zone of the model."
                                       : "Its hinges do not give before they yield, unlike zones of the model.";
@@ -766,11 +805,23 @@ void add_stubs(const Context& c) {
   if (!most) return;
   const auto first =
       std::find_if(c.r.events.begin(), c.r.events.end(), [](const auto& e) { return e.kind == "crushing"; });
-  std::string text = fmt::format("Of {} stubs that charges left under joints what came down has crushed {}",
-                                 stubs.size(), crushed.size());
+  std::string text = stubs.size() == 1
+                         ? std::string("What came down has crushed the one stub that charges left under joints")
+                         : fmt::format("Of {} stubs that charges left under joints what came down has crushed {}",
+                                       stubs.size(), crushed.size());
   if (first != c.r.events.end()) text += fmt::format(", the first at {:.2f} s ({})", first->time, first->subject);
   c.add("stubs", "Touchdown", "Crushed stubs",
         text + fmt::format(". Most: {} by {:.2f} of {:.2f} m.", most->member, by(*most), most->length), by(*most), "m");
+}
+
+/// Where it fell, or each of several structures: "180 deg (heavy), 0 deg (light)".
+std::string tell_ways(const Mechanism& m, int digits) {
+  if (m.falls.empty()) return record::tell_azimuth(m.azimuth, digits);
+  std::string text;
+  for (const Fall& f : m.falls)
+    if (!std::isnan(f.azimuth))
+      text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", record::tell_azimuth(f.azimuth, digits), f.structure);
+  return text;
 }
 
 void add_criteria(const Context& c, const Mechanism& m, const Standing& standing, const Reach& reach) {
@@ -797,21 +848,21 @@ void add_criteria(const Context& c, const Mechanism& m, const Standing& standing
     const double off = calc_deviation(m, *want.azimuth);
     const double tolerance = want.azimuth_tolerance.value_or(c.k.mechanism_direction_tolerance);
     // as many digits as show whether it is within the tolerance
-    const int asked = find_digits(*want.azimuth), about = find_digits(tolerance);
+    const int asked = record::count_digits_of_angle(*want.azimuth), about = record::count_digits_of_angle(tolerance);
     int digits = asked;
     while (std::isfinite(off) && off > tolerance && digits < 6 &&
            fmt::format("{:.{}f}", off / unit::deg, digits) == fmt::format("{:.{}f}", tolerance / unit::deg, digits))
       ++digits;
     judge_one("azimuth", "Direction", off <= tolerance,
               std::isnan(m.azimuth)
-                  ? fmt::format("Asked: {} +- {} deg; nothing fell to any side.", azimuth_words(*want.azimuth, asked),
-                                fixed_words(tolerance / unit::deg, about))
-                  : fmt::format("Asked: {} +- {} deg; found: {}.", azimuth_words(*want.azimuth, asked),
-                                fixed_words(tolerance / unit::deg, about), azimuth_words(m.azimuth, digits)),
+                  ? fmt::format("Asked: {} +- {} deg; nothing fell to any side.",
+                                record::tell_azimuth(*want.azimuth, asked), fixed_words(tolerance / unit::deg, about))
+                  : fmt::format("Asked: {} +- {} deg; found: {}.", record::tell_azimuth(*want.azimuth, asked),
+                                fixed_words(tolerance / unit::deg, about), tell_ways(m, digits)),
               off, "rad", falls_on(off <= tolerance));
   }
   if (want.debris_reach) {
-    const auto [found, limit] = tell_apart(reach.largest, *want.debris_reach);
+    const auto [found, limit] = tell_beside_limit(reach.largest, *want.debris_reach);
     const bool met = reach.largest <= *want.debris_reach;
     const std::string why = !met ? "" : find_what_is_open(c, [&](const OpenPart& part) {
       return calc_distances_at_end(c, part.body, find_start_outline(c.r, part.body)).second + part.way >

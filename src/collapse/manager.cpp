@@ -40,6 +40,18 @@ void Builder::complain(int i, const std::string& what, const std::string& help) 
   complaints.push_back({Severity::Error, "E621", member(i).where, 1, member(i).name + ": " + what, help});
 }
 
+void Builder::complain_of_charge(int i, double position, const std::string& what, const std::string& help) {
+  complain(i, what, help);
+  for (const product::Stage& stage : plan.stages)
+    for (const product::Charge& c : stage.charges)
+      if (c.member == i && c.position == position) {
+        const product::Place place = product::find_values(plan, {c.where}, "position").front();
+        complaints.back().where = {c.where.file, place.line, place.column};
+        complaints.back().width = place.width;
+        return;
+      }
+}
+
 int Builder::find_at(const std::map<GridPoint, int>& members, const GridPoint& at) const {
   const auto it = members.find(at);
   return it == members.end() ? -1 : it->second;
@@ -182,6 +194,13 @@ void Builder::make_columns() {
         return;
       }
   };
+  const auto highest_charge = [&](int index) {
+    double highest = 0;
+    for (const product::Stage& stage : plan.stages)
+      for (const product::Charge& c : stage.charges)
+        if (c.member == index && !c.fails) highest = std::max(highest, c.position);
+    return highest;
+  };
   for (const auto& [at, index] : columns) {
     const Member& m = member(index);
     const product::Section& s = section_of(index);
@@ -208,8 +227,10 @@ void Builder::make_columns() {
     };
     const auto charged = lowest_charge.find(index);
     double split = charged == lowest_charge.end() ? 0 : charged->second;
-    if (split > 0 && split >= low - m.start.z - kUnderJoint) {
-      note_too_high(index, split, low - m.start.z);
+    // the highest one of those that fire
+    const double clear = low - m.start.z, highest = highest_charge(index);
+    if (highest > clear - kUnderJoint + 1e-9) {
+      note_too_high(index, highest, clear);
       continue;
     }
     if (split < 0.02) split = 0;
@@ -243,7 +264,7 @@ void Builder::make_columns() {
                           fmt::format("{}{}: a charge lies in the joint above the clear height of {:.4g} m",
                                       member(t.charge->member).name,
                                       t.more > 0 ? fmt::format(" and {} more", t.more) : "", t.clear_height),
-                          fmt::format("its position must be below {:.4g} m, {:g} cm under the joint",
+                          fmt::format("its position must be {:.4g} m or less, {:g} cm under the joint",
                                       t.clear_height - kUnderJoint, kUnderJoint / unit::cm)});
   }
 }

@@ -68,7 +68,10 @@ std::optional<double> find_last_swing(const MechanismInput& in) {
     if (!(norm(way) <= norm(axis))) axis = way;
   }
   const double length = norm(axis);
-  if (!(length > 0) || !std::isfinite(length)) return {};
+  if (!std::isfinite(length)) return {};
+  // what round-off makes of a building at rest is no swing
+  constexpr double still = 1e-6, enough_time = 0.1;  // [m, s]
+  if (length < still) return in.frames.back().time - begin->time >= enough_time ? std::optional(0.0) : std::nullopt;
   std::vector<double> along;
   for (auto f = begin; f != in.frames.end(); ++f) along.push_back(dot(f->displacement, axis) / length);
   const auto [low, high] = std::minmax_element(along.begin(), along.end());
@@ -161,9 +164,10 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.text = fmt::format("The building stands: {:.1f} % of its mass came down.", 100 * out.moved);
     if (const auto swing = in.came_to_rest ? std::nullopt : find_last_swing(in)) {
       sways_less = true;
-      out.text += fmt::format(
-          " It sways on, less than it did: its upper block went {:.1f} cm from side to side in the last swing.",
-          100 * *swing);
+      if (*swing > 0)
+        out.text += fmt::format(
+            " It sways on, less than it did: its upper block went {:.1f} cm from side to side in the last swing.",
+            100 * *swing);
     }
   } else if (out.moved < k.mechanism_stands_share && !in.came_to_rest) {
     out.name = "partial";
@@ -289,16 +293,23 @@ Mechanism join_mechanisms(const std::vector<std::string>& names, const std::vect
       std::find_if(verdicts.begin(), verdicts.end(), [](const Mechanism& m) { return m.name == "wrong direction"; });
   const size_t lead = wrong == verdicts.end() ? 0 : static_cast<size_t>(wrong - verdicts.begin());
   Mechanism out = verdicts[lead];
-  double moved = 0, mass = 0;
+  double moved = 0, mass = 0, heaviest = 0;
+  Vec3 run;
   bool do_agree = true;
   out.is_final = std::all_of(verdicts.begin(), verdicts.end(), [](const Mechanism& m) { return m.is_final; });
   std::string all;
   for (size_t i = 0; i < verdicts.size(); ++i) {
     moved += masses[i] * verdicts[i].moved, mass += masses[i];
+    run += masses[i] * verdicts[i].run;
+    out.falls.push_back({names[i], verdicts[i].time, verdicts[i].azimuth, verdicts[i].is_azimuth_of_lean});
+    // of the heaviest one that fell to a side
+    if (wrong == verdicts.end() && !std::isnan(verdicts[i].azimuth) && masses[i] > heaviest)
+      heaviest = masses[i], out.azimuth = verdicts[i].azimuth;
     do_agree &= verdicts[i].name == out.name;
     all += fmt::format(" Verdict on {}: {}.", names[i], verdicts[i].name);
   }
   out.moved = mass > 0 ? moved / mass : 0;
+  if (mass > 0) out.run = (1 / mass) * run;
   out.may_swing_back =
       std::any_of(verdicts.begin(), verdicts.end(), [](const Mechanism& m) { return m.may_swing_back; }) &&
       std::all_of(verdicts.begin(), verdicts.end(),

@@ -53,6 +53,13 @@ struct MechanismInput {
   bool is_under_way = false;  // the run goes on; for the words
 };
 
+/// Where one of several structures fell.
+struct Fall {
+  std::string structure;
+  double time = 0, azimuth = 0;  // as those of its Mechanism
+  bool is_azimuth_of_lean = false;
+};
+
 struct Mechanism {
   std::string name;       // "topple", "fold", "vertical", "progressive", "partial", "wrong direction", "stands"
   std::string text;       // a sentence with its numbers
@@ -66,7 +73,8 @@ struct Mechanism {
   // the way the block leans then, if it topples; else the way the mass centre moved, NaN below half a metre [rad]
   double azimuth = 0;
   bool is_azimuth_of_lean = false;
-  Vec3 run;  // of the mass centre until the end, horizontal [m]
+  Vec3 run;                 // of the mass centre until the end, horizontal [m]
+  std::vector<Fall> falls;  // of structures that stand apart, where there are several
   // at rest, or so far down that what is still to come does not change the name, or swaying less than it did
   bool is_final = false;
   bool may_swing_back = false;  // it only leans, and still moves

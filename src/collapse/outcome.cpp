@@ -171,8 +171,29 @@ Heap find_heap(const record::Record& r, size_t frame) {
 }
 
 double calc_deviation(const Mechanism& m, double azimuth) {
-  return std::abs(std::remainder(m.azimuth - azimuth, 2 * std::numbers::pi));
+  const auto off = [azimuth](double found) { return std::abs(std::remainder(found - azimuth, 2 * std::numbers::pi)); };
+  double most = off(m.azimuth);
+  for (const Fall& f : m.falls)
+    if (!(off(f.azimuth) <= most) && !std::isnan(f.azimuth)) most = off(f.azimuth);
+  return most;
 }
+
+namespace {
+
+/// Of a place, as records keep poses [m].
+double rounding_of(const PlacedBox& box) {
+  return std::max(1e-5, 0x1p-22 * std::max(std::abs(box.X_WS.p.x), std::abs(box.X_WS.p.y)));
+}
+
+/// Whether a box seen from above overlaps an area by no more than rounding.
+bool only_touches(const PlacedBox& box, const Polygon& area) {
+  const double rounding = rounding_of(box);
+  PlacedBox within = box;
+  for (int i = 0; i < 3; ++i) within.half[i] = std::max(0.0, box.half[i] - rounding);
+  return calc_distance(calc_outline(within), area) > 0;
+}
+
+}  // namespace
 
 Approach find_approach(const record::Record& r, const Polygon& area, const std::atomic<bool>* cancel) {
   Approach out;
@@ -191,9 +212,10 @@ Approach find_approach(const record::Record& r, const Polygon& area, const std::
                                std::max({nlow[1] - box.X_WS.p.y - radius, box.X_WS.p.y - radius - nhigh[1], 0.0})};
         const double at_least = std::hypot(gap[0], gap[1]);
         if (at_least > 0 && at_least >= out.least) continue;
-        const double d = calc_distance(calc_outline(box), area);
+        double d = calc_distance(calc_outline(box), area);
+        if (d < rounding_of(box)) d = 0;
         if (d < out.least) out.least = d, out.when = r.time[f], out.body = b;
-        if (d > 0) continue;
+        if (d > 0 || only_touches(box, area)) continue;
         const double height = calc_lowest_over(box, area);
         if (height < out.lowest) out.lowest = height, out.lowest_when = r.time[f], out.lowest_body = b;
       }
@@ -219,7 +241,8 @@ std::vector<PartReach> find_part_reaches(const record::Record& r, size_t frame) 
     if (r.bodies[b].fixed) continue;
     PartReach part;
     part.body = b;
-    part.mass = r.bodies[b].mass;
+    // what is thrown out is still in the mass of its member
+    part.mass = r.bodies[b].kind == "debris" ? 0 : r.bodies[b].mass;
     const Pose X_WB = record::pose_at(r, frame, b);
     const Polygon from = find_start_outline(r, b);
     double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};

@@ -11,6 +11,7 @@
 #include "collapse/outcome.h"
 #include "collapse/vibration.h"
 #include "record/provenance.h"
+#include "record/told.h"
 
 namespace topple::collapse {
 
@@ -183,10 +184,9 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
     if (n.building_class != product::BuildingClass::Unknown)
       add("Limits", "Class of " + n.name, describe_vibration_limit(n.building_class));
   }
+  const double planned = std::atan2(map.fall_direction.y, map.fall_direction.x);
   add("Planned fall", "Azimuth",
-      map.is_direction_planned
-          ? fmt::format("{:.0f} deg", std::atan2(map.fall_direction.y, map.fall_direction.x) / unit::deg)
-          : "not given");
+      map.is_direction_planned ? record::tell_azimuth(planned, record::count_digits_of_angle(planned)) : "not given");
 }
 
 void fill_building(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, record::Record& r) {

@@ -230,10 +230,10 @@ void Builder::make_shaft(int index) {
   const std::vector<Level> levels = find_levels(plan, index);
   for (size_t i = 1; i < levels.size(); ++i)
     if (levels[i].low() < levels[i - 1].high() + kLeastRing) {
-      complain(index,
-               fmt::format("the mouths or cuts at {:.2f} m and {:.2f} m are too near to each other", levels[i - 1].at,
-                           levels[i].at),
-               "leave at least 0.3 m of the shaft between them, or give them the same position");
+      complain_of_charge(index, levels[i].at,
+                         fmt::format("the mouths or cuts at {:.2f} m and {:.2f} m are too near to each other",
+                                     levels[i - 1].at, levels[i].at),
+                         "leave at least 0.3 m of the shaft between them, or give them the same position");
       return;
     }
   const bool has_stump =
@@ -242,7 +242,8 @@ void Builder::make_shaft(int index) {
   if (!has_stump) fixed.push_back(0);
   for (const Level& l : levels) {
     if (l.high() > H - kLeastRing || (!has_stump && l.low() < 0.1)) {
-      complain(index, fmt::format("a cut at {:.2f} m leaves nothing of the shaft on one side", l.at));
+      complain_of_charge(index, l.at,
+                         fmt::format("a mouth or cut at {:.2f} m leaves nothing of the shaft on one side", l.at));
       return;
     }
     fixed.push_back(l.at);

@@ -36,12 +36,13 @@ void check_input(const ConcreteInput& in) {
     throw InputError("E601", "concrete: the plastic shares b_c and b_t must lie between 0 and 1");
   if (!(in.limit_ratio > 0 && in.limit_ratio < 1))
     throw InputError("E601", "concrete: the linear limit must lie between 0 and 1 of fc");
+  constexpr double kLeastPeakStrain = 1.05;  // as plans are read
   // The second branch rises monotonically only if the curve bends below the elastic line: k > 1.
-  if (in.Ec * in.eps_c1 < 1.05 * in.fc)
+  if (in.eps_c1 < kLeastPeakStrain * in.fc / in.Ec)
     throw InputError("E602",
-                     "concrete: Ec * eps_c1 = " + show(in.Ec * in.eps_c1 / unit::MPa) +
-                         " MPa lies below fc = " + show(in.fc / unit::MPa) + " MPa",
-                     "the strain at the peak must be at least 1.05 fc / Ec");
+                     "concrete: eps_c1 = " + show(in.eps_c1) + " is less than " + show(kLeastPeakStrain) +
+                         " fc / Ec = " + show(kLeastPeakStrain * in.fc / in.Ec),
+                     "the rising branch must bend below the elastic line on its way to the peak");
 }
 
 /// Energy per volume that unloading from the peak gives back, equation (8).

@@ -734,6 +734,8 @@ RunSettings Reader::run_from(const Node& n) const {
   if (r.step > 0 && r.duration > kMostSteps * r.step)
     n["step"].fail(fmt::format("must be at least {:.3g} for the duration of {:g} s: a run takes at most {:g} steps",
                                r.duration / kMostSteps, r.duration, kMostSteps));
+  if (r.duration > 0 && r.step > r.duration)
+    n["step"].fail(fmt::format("must not be longer than the run of {:g} s", r.duration));
   if (n.has("stability_share")) r.stability_share = n["stability_share"].positive();
   if (r.stability_share > 1) n["stability_share"].fail("must be at most 1");
   if (n.has("frame_interval")) r.frame_interval = n["frame_interval"].positive();

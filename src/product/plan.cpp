@@ -81,8 +81,8 @@ double calc_mass(const Plan& plan, const Member& m) {
     case MemberKind::Beam: {
       // each half of the width ends below the slab on its side
       const Section& s = section_of(plan, m);
-      const double covered = (calc_slab_beside(plan, m, true) + calc_slab_beside(plan, m, false)) / 2;
-      const double area = s.width * std::max(0.0, s.height - covered);
+      const auto height = [&](bool left) { return std::max(0.0, s.height - calc_slab_beside(plan, m, left)); };
+      const double area = s.width * (height(true) + height(false)) / 2;
       return plan.concretes[static_cast<size_t>(s.concrete)].density * area * std::max(0.0, calc_clear_length(plan, m));
     }
     case MemberKind::Slab: {

@@ -12,9 +12,10 @@ inline constexpr Range storey_height{1, 50};
 inline constexpr Range section_size{0.05, 10}, panel_thickness{0.03, 3};
 inline constexpr Range bar_diameter{4 * unit::mm, 80 * unit::mm};
 inline constexpr Range tie_diameter{2 * unit::mm, 40 * unit::mm}, tie_spacing{10 * unit::mm, 2};
-inline constexpr int bars = 100;           // of one kind
-inline constexpr Range site{-10e3, 10e3};  // coordinates around it [m]
-inline constexpr size_t corners = 200;     // of a footprint
+inline constexpr int bars = 100;                   // of one kind
+inline constexpr double least_peak_strain = 1.05;  // of concrete, over fc / Ec, below which no curve rises to fc
+inline constexpr Range site{-10e3, 10e3};          // coordinates around it [m]
+inline constexpr size_t corners = 200;             // of a footprint
 inline constexpr size_t neighbours = 1000;
 inline constexpr double footprint = 0.01;  // at least [m²]
 

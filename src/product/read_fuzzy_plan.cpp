@@ -373,7 +373,9 @@ void FuzzyReader::read_leaf(const Entry& entry, const std::vector<std::string>& 
     std::vector<std::string> known;
     for (const Target& t : targets) known.push_back(path_of(t));
     complaints.error("E203", entry.place, "fuzzy: " + quoted(words) + " is no value of this plan that can be fuzzy",
-                     did_you_mean(words, known, "quantities of the plan can be, words and whole numbers cannot"));
+                     std::find(known.begin(), known.end(), words) != known.end()
+                         ? "write it without quotes, its dots lead into the plan"
+                         : did_you_mean(words, known, "quantities of the plan can be, words and whole numbers cannot"));
     return;
   }
   if (entry.value.kind != Node::Kind::Table) {

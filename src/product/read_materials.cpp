@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -61,10 +63,10 @@ Concrete read_concrete(const Entry& entry, Complaints& complaints) {
   c.density = table.quantity("density", Dimension::Density, {300, 10000}, 2500);
   table.finish();
   // the rising branch starts with the slope Ec and must reach fc before it would as a straight line
-  if (c.eps_c1 <= c.fc / c.Ec)
+  if (const double least = limits::least_peak_strain * c.fc / c.Ec; c.eps_c1 < least)
     table.error("E207", table.place_of(table.has("eps_c1") ? "eps_c1" : "Ec"),
-                "the strain at the peak, eps_c1, must be larger than fc / Ec",
-                "with these values eps_c1 must be above " + std::to_string(c.fc / c.Ec));
+                fmt::format("the strain at the peak, eps_c1, must be at least {:g} fc / Ec", limits::least_peak_strain),
+                fmt::format("with these values eps_c1 must be {:.6f} or more", std::ceil(1e6 * least) / 1e6));
   if (fct && *fct >= c.fc) table.error("E207", table.place_of("fct"), "fct must be smaller than fc");
   return c;
 }
@@ -109,9 +111,9 @@ Layer read_layer(TableReader& table, const std::string& key) {
     table.error("E208", node->place, key + ": " + quoted(text) + " does not name bars", help);
     return {};
   }
-  if (count < 1 || count > limits::bars) {
+  if (count < 0 || count > limits::bars) {
     table.error("E205", node->place, key + ": " + std::to_string(count) + " bars are out of range",
-                "allowed: between 1 and " + std::to_string(limits::bars));
+                "allowed: between 0 and " + std::to_string(limits::bars));
     return {};
   }
   Node diameter = *node;
@@ -161,10 +163,13 @@ void read_bars(TableReader& table, Section& s) {
   for (const bool is_top : {true, false}) {
     const char* key = is_top ? "top" : "bottom";
     const Layer layer = read_layer(table, key);
-    if (layer.count == 0) continue;
-    if (table.has("bars"))
+    if (table.has(key) && table.has("bars"))
       table.error("E207", table.place_of(key), std::string(key) + ": is not possible beside bars",
                   "either bars around the section, or layers at the top and the bottom");
+    // a face whose line was forgotten is not one without bars
+    if (!table.has(key) && table.has(is_top ? "bottom" : "top") && !table.has("bars"))
+      table.missing(key, fmt::format("add {0} = \"4 x 20 mm\", or {0} = \"0 x 20 mm\" for a face without bars", key));
+    if (layer.count == 0) continue;
     const double y = s.width / 2 - inset - layer.diameter / 2, z = s.height / 2 - inset - layer.diameter / 2;
     check_room(table, table.place_of(key), layer.count, layer.diameter, y, "width");
     check_room(table, table.place_of(key), 1, layer.diameter, z, "height");
@@ -227,7 +232,7 @@ Panel read_panel(Reading& reading, const Entry& entry, bool is_wall) {
       p.density = c.density, p.strength = c.fc, p.modulus = c.Ec;
     }
     for (const char* key : {"density", "strength", "modulus"})
-      if (table.find(key))
+      if (is_wall && table.find(key))
         table.error("E207", table.place_of(key), std::string(key) + ": belongs to masonry; the concrete has its own",
                     "leave it out, or leave out concrete");
   }

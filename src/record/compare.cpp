@@ -246,11 +246,12 @@ Comparison compare(const Record& a, const Record& b, const std::string& path_a, 
 }
 
 std::vector<std::string> summarise(const Comparison& c) {
+  const double later = c.touchdown_b - c.touchdown_a;
   std::vector<std::string> out = {
       fmt::format("First touchdown of the upper block: A {}, B {}{}.", seconds(c.touchdown_a, c.end_a),
                   seconds(c.touchdown_b, c.end_b),
                   std::isfinite(c.touchdown_a) && std::isfinite(c.touchdown_b)
-                      ? fmt::format(", difference {:+.3f} s", c.touchdown_b - c.touchdown_a)
+                      ? fmt::format(", difference {:+.3f} s", std::abs(later) < 5e-4 ? 0.0 : later)
                       : std::string()),
       std::isfinite(c.tilt_difference)
           ? fmt::format("Tilt up to {:.2f} s: largest difference {:.2f} deg at {:.2f} s{}.", c.until,

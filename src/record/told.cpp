@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "base/unit.h"
+
 namespace topple::record {
 
 std::string drop_negative_zeros(const std::string& text) {
@@ -32,6 +34,23 @@ std::string tell_measure(double value, const char* unit, int digits) {
   if (!(std::abs(value) < least) || value == 0) return fmt::format("{:.{}f} M{}", value * 1e-6, digits, unit);
   if (std::abs(value) >= 100) return fmt::format("{:.1f} k{}", value * 1e-3, unit);
   return fmt::format("{:.2g} {}", value, unit);
+}
+
+std::string tell_azimuth(double azimuth, int digits) {
+  const auto tell = [digits](double degrees) { return fmt::format("{:.{}f} deg", degrees, digits); };
+  double degrees = std::fmod(azimuth / unit::deg, 360.0);
+  // what is written as -0 is 0, and what is written as 360 too
+  if (degrees < 0 && tell(degrees) != tell(-0.0)) degrees += 360;
+  return tell(degrees) == tell(-0.0) || tell(degrees) == tell(360) ? tell(0) : tell(degrees);
+}
+
+int count_digits_of_angle(double angle) {
+  constexpr int most = 6;
+  int digits = 0;
+  const double degrees = angle / unit::deg;
+  for (double scale = 1; digits < most && std::abs(std::round(degrees * scale) / scale - degrees) > 1e-9; scale *= 10)
+    ++digits;
+  return digits;
 }
 
 void add_finding(Record& r, Finding finding) {

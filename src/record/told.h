@@ -17,6 +17,13 @@ std::string drop_negative_zeros(const std::string& text);
 ///   digits  behind the point of millions
 std::string tell_measure(double value, const char* unit, int digits);
 
+/// An azimuth between 0 and 360 deg: "359.75 deg".
+///   digits  behind the point
+std::string tell_azimuth(double azimuth, int digits = 0);
+
+/// Digits behind the point of an angle as it was given in degrees, at most 6.
+int count_digits_of_angle(double angle);
+
 void add_finding(Record&, Finding);
 void add_event(Record&, Event);
 

@@ -158,6 +158,8 @@ struct Reader {
     if (j.contains("failed") && !j["failed"].is_null() && !(j["failed"].is_boolean() && !j["failed"].get<bool>())) {
       a.kind = Answer::Kind::Failed;
       a.text = j["failed"].is_string() ? j["failed"].get<std::string>() : "the evaluator says so";
+      if (!j["failed"].is_string() && !j["failed"].is_boolean())
+        return refuse(find_member(line, "failed"), "failed: a text is wanted");
       return a;
     }
     // null stands for what is left out

@@ -138,7 +138,7 @@ json insights_json(const Problem& p, const StudyResult& r) {
       inputs.push_back(one);
     }
     boxes["list"].push_back({{"kept", b.kept},
-                             {"guarantee", tell_guarantee(b, p.space.has_interaction())},
+                             {"guarantee", tell_guarantee(b, d.forbidden + d.failed, p.space.has_interaction())},
                              {"inputs", inputs},
                              {"volume", b.volume},
                              {"runs", b.samples},
@@ -309,6 +309,12 @@ std::vector<std::string> list_unmet_outcomes(const Problem& p, const StudyResult
   return unmet;
 }
 
+bool is_necessity_converged(const Problem& p, const StudyResult& r, int outcome) {
+  // what was never met was not searched for to an end either
+  return necessity_of(r, outcome) <= 0 ||
+         (uncertainty::is_necessity_converged(r.possibilities, outcome) && list_unmet_outcomes(p, r).empty());
+}
+
 std::string words_of_outcome(const StudyResult& r, int outcome) {
   const std::string name = name_of_outcome(r, outcome);
   return name.empty() ? "(no name)" : name;
@@ -386,7 +392,7 @@ json make_results_json(const Problem& p, const StudyResult& r) {
            {"runs", c.count},
            {"possibility", possibility_of(r, c)},
            {"necessity", necessity_of(r, c.outcome)},
-           {"necessity_converged", uncertainty::is_necessity_converged(r.possibilities, c.outcome)},
+           {"necessity_converged", is_necessity_converged(p, r, c.outcome)},
            {"sample", c.sample}};
     for (const auto& found : r.possibilities.classes)
       if (found.outcome == c.outcome) add_search(o, found);
@@ -427,12 +433,12 @@ std::string write_membership_csv(const Problem& p, const StudyResult& r) {
   return text;
 }
 
-std::string write_outcomes_csv(const StudyResult& r) {
+std::string write_outcomes_csv(const Problem& p, const StudyResult& r) {
   std::string text = "outcome,runs,possibility,necessity,possibility_converged,necessity_converged\n";
   for (const auto& c : r.alpha.classes)
     text += fmt::format("{},{},{},{},{:d},{:d}\n", cell(name_of_outcome(r, c.outcome)), c.count,
                         cell(possibility_of(r, c)), cell(necessity_of(r, c.outcome)), is_possibility_converged(r, c),
-                        uncertainty::is_necessity_converged(r.possibilities, c.outcome));
+                        is_necessity_converged(p, r, c.outcome));
   return text;
 }
 
@@ -458,6 +464,14 @@ std::string write_limits_csv(const Problem& p, const StudyResult& r) {
   return "output,kind,place,unit,limit,runs,broken,open,possibility_of_breaking,possibility_converged\n" + text;
 }
 
+/// A number in a unit that gives the same bits when it is read with it again, where there is one.
+double read_in(double unit, double x) {
+  const double y = x / unit;
+  for (const double near : {y, std::nextafter(y, -HUGE_VAL), std::nextafter(y, HUGE_VAL)})
+    if (near * unit == x) return near;
+  return y;
+}
+
 std::string write_samples_csv(const Problem& p, const StudyResult& r) {
   // inputs have names of their own; those of outputs are the model's, and may be any
   std::set<std::string> titles = {"sample", "membership", "outcome", "failure"};
@@ -474,7 +488,7 @@ std::string write_samples_csv(const Problem& p, const StudyResult& r) {
   for (std::size_t i = 0; i < r.alpha.archive.size(); ++i) {
     const uncertainty::Sample& s = r.alpha.archive.samples()[i];
     text += std::to_string(i);
-    for (std::size_t k = 0; k < s.x.size(); ++k) text += "," + cell(s.x[k] / p.inputs[k].unit_value);
+    for (std::size_t k = 0; k < s.x.size(); ++k) text += "," + cell(read_in(p.inputs[k].unit_value, s.x[k]));
     if (p.calc_derived) {
       const std::vector<double> derived = p.calc_derived(s.x);
       for (std::size_t k = 0; k < derived.size(); ++k) text += "," + cell(derived[k] / p.derived[k].unit_value);
@@ -626,7 +640,7 @@ std::vector<std::string> write_results(const std::string& folder, const Problem&
   };
   write("results.json", write_results_json(p, r));
   write("membership.csv", write_membership_csv(p, r));
-  write("outcomes.csv", write_outcomes_csv(r));
+  write("outcomes.csv", write_outcomes_csv(p, r));
   write("requirement.csv", write_requirement_csv(p, r));
   write("limits.csv", write_limits_csv(p, r));
   write("samples.csv", write_samples_csv(p, r));

@@ -18,6 +18,8 @@ std::string name_of_outcome(const StudyResult&, int outcome);
 std::string words_of_outcome(const StudyResult&, int outcome);
 /// Classes that the problem knows beforehand and no run has had.
 std::vector<std::string> list_unmet_outcomes(const Problem&, const StudyResult&);
+/// Whether a necessity is that of searches which ended, of all outcomes that there may be.
+bool is_necessity_converged(const Problem&, const StudyResult&, int outcome);
 
 /// Everything but the samples, in the units of the file that was read; outputs in those of Problem::outputs.
 nlohmann::ordered_json make_results_json(const Problem&, const StudyResult&);
@@ -26,7 +28,7 @@ std::string write_results_json(const Problem&, const StudyResult&);
 /// each outcome by itself where there are several.
 std::string write_membership_csv(const Problem&, const StudyResult&);
 /// Outcome classes: runs, possibility, necessity.
-std::string write_outcomes_csv(const StudyResult&);
+std::string write_outcomes_csv(const Problem&, const StudyResult&);
 /// The same of runs that keep the requirement, break it and fail; empty if none is asked for.
 std::string write_requirement_csv(const Problem&, const StudyResult&);
 /// Limits of a plan: how runs fare with each, and how possible it is that it is broken; empty if there are none.

@@ -353,8 +353,10 @@ void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Senten
 
 }  // namespace
 
-std::string tell_guarantee(const uncertainty::PermissibleBox& b, bool has_interaction) {
+std::string tell_guarantee(const uncertainty::PermissibleBox& b, int violating, bool has_interaction) {
   std::string text;
+  const bool is_small =
+      b.samples == 0 || b.volume < uncertainty::calc_smallest(uncertainty::DesignOptions{}.smallest, b.box);
   if (b.kept) {
     text = fmt::format("No run violated the requirement in {} inside, {} of them at fresh random points", b.samples,
                        b.fresh);
@@ -362,7 +364,10 @@ std::string tell_guarantee(const uncertainty::PermissibleBox& b, bool has_intera
       text += fmt::format(": with a confidence of 95 % at most {} % of the box violates it",
                           words_of_most(100 * b.violating, 1));
     text += ". It is not proven, and smaller islands may exist.";
-  } else if (b.samples == 0 || b.volume < uncertainty::calc_smallest(uncertainty::DesignOptions{}.smallest, b.box)) {
+  } else if (is_small && violating == 0) {
+    text = "This box was dropped: the runs were used up before it could be checked.";
+    text += " More runs may find a box.";
+  } else if (is_small) {
     text =
         "This box was dropped: what violates the requirement leaves too little room around these runs (below a "
         "thousandth of the support; of more than three inputs, below a tenth of its width in the mean).";
@@ -522,6 +527,9 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
     } else if (of_others > 0) {
       text += ". " + tell_impossible("Another outcome", of_others, runs, is_searched);
       if (status != Status::Bad && !is_searched) status = Status::Warning;
+    } else if (std::all_of(p.space.inputs.begin(), p.space.inputs.end(),
+                           [](const auto& x) { return x.width() == 0; })) {
+      text += ". No input varies, so there is no other.";
     } else {
       const int of_search = r.alpha.coverage.empty() ? 0 : r.alpha.coverage.front().space_points;
       const double spread = std::max({1, of_search, static_cast<int>(r.spread.size())});

@@ -45,7 +45,7 @@ std::string words_of_point(const Problem&, const Point&);
 std::vector<Sentence> tell(const Problem&, const StudyResult&);
 
 /// What is known of a permissible box, and what is not.
-std::string tell_guarantee(const uncertainty::PermissibleBox&, bool has_interaction = false);
+std::string tell_guarantee(const uncertainty::PermissibleBox&, int violating, bool has_interaction = false);
 
 /// Runs that somebody should look at: of each outcome but that of the core its most possible run, of each output the
 /// runs with its least and largest value.

@@ -59,6 +59,9 @@ FuzzyNumber::FuzzyNumber(std::vector<AlphaCut> cuts) : cuts_(std::move(cuts)) {
       refuse(fmt::format("the cut [{}, {}] at alpha {} is not inside [{}, {}] at alpha {}", cuts_[k].left,
                          cuts_[k].right, cuts_[k].alpha, cuts_[k - 1].left, cuts_[k - 1].right, cuts_[k - 1].alpha));
   }
+  // the support is the closure of what has a membership above 0: feet without any do not count
+  const auto inner = std::find_if(cuts_.begin(), cuts_.end(), [](const AlphaCut& c) { return c.alpha > 0; }) - 1;
+  cuts_.erase(cuts_.begin(), inner);
 }
 
 AlphaCut FuzzyNumber::cut(double alpha) const {

@@ -125,8 +125,11 @@ Statistic make_quantile(int output, double q) {
     auto values = pick(runs, output);
     if (values.empty()) return nan;
     std::sort(values.begin(), values.end());
-    const double last = static_cast<double>(values.size() - 1);
-    const double place = std::clamp(q * static_cast<double>(values.size()) - 0.5, 0.0, last);
+    // beyond the middle of the outer strata nothing is known, as where runs have failed
+    const double last = static_cast<double>(values.size() - 1), at = q * static_cast<double>(values.size()) - 0.5;
+    constexpr double round_off = 1e-9;
+    if (!(at >= -round_off && at <= last + round_off)) return nan;
+    const double place = std::clamp(at, 0.0, last);
     const auto below = static_cast<std::size_t>(std::floor(place));
     const double part = place - std::floor(place);
     return part > 0 ? values[below] + part * (values[below + 1] - values[below]) : values[below];

@@ -23,8 +23,9 @@ struct Columns {
   std::vector<std::vector<double>> mixed;  // per input
 };
 
-/// Part of a variance that rounding may make, for values of size 1.
-constexpr double rounding = 1e-28;
+/// What rounding may make of values of size 1 that are sums or statistics of some hundred numbers, and the part of a
+/// variance.
+constexpr double rounding_of_values = 64 * std::numeric_limits<double>::epsilon(), rounding = 1e-28;
 
 /// Takes off a common value and the common size of what is left: then sizes do not matter, neither for squares nor for
 /// rounding. Values that differ by no more than rounding become 0. By powers of 2 first, which keep every bit.
@@ -38,7 +39,7 @@ void normalise(const std::vector<std::vector<double>*>& columns) {
   double size = 0;
   for (auto* c : columns)
     for (double& v : *c) v = std::ldexp(v, -exponent) - reference, size = std::max(size, std::abs(v));
-  const bool is_constant = size <= 4 * std::numeric_limits<double>::epsilon();
+  const bool is_constant = size <= rounding_of_values;
   for (auto* c : columns)
     for (double& v : *c) v = is_constant ? 0 : v / size;
 }
@@ -248,6 +249,7 @@ std::vector<Fixed> find_outcomes_of_knowing(const Space& space, Asker& asker, co
   std::vector<Fixed> effects;
   const int whole_limit = asker.limit();
   for (int i = 0; i < space.size() && !asker.is_cancelled(); ++i) {
+    if (!(space.inputs[i].width() > 0)) continue;  // it is known
     const double core = space.inputs[i].centre();
     Space known = space;
     known.inputs[i] = FuzzyNumber(core);

@@ -98,6 +98,33 @@ TEST(Reach, CountsTheMassTowardsEachSide) {
   EXPECT_NEAR(calc_area(calc_share_outline(r, 1, 1)), 7.5, 1e-6);
 }
 
+TEST(Reach, CountsWhatIsThrownOutOnceWithItsMember) {
+  record::Record r = make_three();
+  r.bodies[2].kind = "debris";  // its tonne is in those of the others
+  EXPECT_NEAR(calc_reach(r, 1).largest, 5, 1e-6);
+  EXPECT_NEAR(calc_reach(r, 1).most_mass, 1, 1e-6);
+}
+
+TEST(Approach, WhatOnlyTouchesIsNotOverIt) {
+  // far out, where a record's poses are rounded to 3e-5 m
+  for (const double far : {0.0, 777.3}) {
+    record::Record r = make_three();
+    r.bodies.resize(1);
+    r.time.clear(), r.position.clear(), r.orientation.clear();
+    add_frame(r, {{2 + far, 2 + far, 0}});
+    const auto area = [far](double x) {
+      return Polygon{{x + far, far}, {x + far + 5, far}, {x + far + 5, far + 4}, {x + far, far + 4}};
+    };
+    const Approach touching = find_approach(r, area(2.5));
+    EXPECT_EQ(touching.least, 0) << far;
+    EXPECT_FALSE(std::isfinite(touching.lowest)) << far;
+    const Approach over = find_approach(r, area(2.49));
+    EXPECT_EQ(over.least, 0) << far;
+    EXPECT_NEAR(over.lowest, 0, 1e-6) << far;
+    EXPECT_NEAR(find_approach(r, area(2.6)).least, 0.1, 1e-4) << far;
+  }
+}
+
 TEST(DebrisTables, HoldEverySquareAndEveryCorner) {
   const std::string heights = make_height_table(make_three(), 0.5);
   // three boxes of 1 m x 1 m, each over four squares, 2 m high

@@ -227,11 +227,23 @@ TEST(Manager, SaysOnceOfAChargeThatItLiesTooHighAndWhere) {
   EXPECT_EQ(found[0].code, "E621");
   // storeys of 3 m above beams of 0.5 m
   EXPECT_EQ(found[0].message, "C-A1-0 and 2 more: a charge lies in the joint above the clear height of 2.5 m");
-  EXPECT_EQ(found[0].help, "its position must be below 2.48 m, 2 cm under the joint");
+  EXPECT_EQ(found[0].help, "its position must be 2.48 m or less, 2 cm under the joint");
   const size_t at = text.find("\"2.5 m\"");
   EXPECT_EQ(found[0].where.line, 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
   EXPECT_EQ(found[0].where.column, static_cast<int>(at - text.rfind('\n', at)));
   EXPECT_EQ(found[0].width, 7);
+}
+
+TEST(Manager, RefusesASecondChargeInTheJointToo) {
+  const auto found = [](const char* position) {
+    std::string text = house(charge("C-A*-0")), second = charge("C-A*-0", "0.5 s");
+    second.replace(second.find("position = \"1 m\""), 16, fmt::format("position = \"{}\"", position));
+    second.replace(second.find("destroyed_length = \"1 m\""), 24, "destroyed_length = \"0.2 m\"");
+    text.insert(text.find("[analysis]"), second);
+    return complaint_of(read(text));
+  };
+  EXPECT_THAT(found("2.6 m"), testing::HasSubstr("a charge lies in the joint above the clear height of 2.5 m"));
+  EXPECT_EQ(found("2.48 m"), "");  // 2 cm under it
 }
 
 TEST(Manager, NamesMembersThatCannotBeBuilt) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "collapse/outcome.h"
+
 namespace topple::collapse {
 namespace {
 
@@ -126,7 +128,7 @@ MechanismInput swaying(double aside, double down) {
 }
 
 TEST(Mechanism, WhatSwaysStandsInWhicheverPartOfItsSwing) {
-  for (const double aside : {0.0, 0.09, 0.11, 0.185, 0.42}) {
+  for (const double aside : {0.001, 0.09, 0.11, 0.185, 0.42}) {
     const Mechanism m = judge_mechanism(swaying(aside, 0.075 * aside), default_knowledge());
     EXPECT_EQ(m.name, "stands") << aside;
     EXPECT_FALSE(m.is_final);
@@ -172,7 +174,7 @@ TEST(Mechanism, TellsWhichOtherVerdictIsNear) {
 }
 
 /// Mass centre of a shaft that swings about `lean` with e^(-decay t) cos(2 π t / 4 s), from the charge at 1 s to `end`.
-MechanismInput swinging(double lean, double decay, double end) {
+MechanismInput swinging(double lean, double decay, double end, double size = 0.1) {
   MechanismInput in = swaying(0, 0);
   in.last_charge = 1;
   const BlockFrame start = in.frames.front();
@@ -181,7 +183,7 @@ MechanismInput swinging(double lean, double decay, double end) {
     BlockFrame f = start;
     f.time = t;
     if (t > 1)
-      f.displacement.x = lean * (t - 1) - 0.1 * (1 - std::exp(-decay * (t - 1)) * std::cos(std::acos(0.0) * (t - 1)));
+      f.displacement.x = lean * (t - 1) - size * (1 - std::exp(-decay * (t - 1)) * std::cos(std::acos(0.0) * (t - 1)));
     in.frames.push_back(f);
   }
   return in;
@@ -369,6 +371,29 @@ TEST(Mechanism, StructuresThatStandApartHaveOneVerdictIfTheyAgree) {
   EXPECT_EQ(join({topple, stands}).moved, 0.75);
   EXPECT_EQ(join({topple, wrong}).name, "wrong direction");
   EXPECT_EQ(join({topple, wrong}).tilt, 2);
+}
+
+TEST(Mechanism, StructuresThatStandApartFallEachToItsSide) {
+  Mechanism stands, falls;
+  stands.name = "stands", stands.azimuth = kNaN;
+  falls.name = "topple", falls.azimuth = 3.1, falls.is_azimuth_of_lean = true, falls.run = {-8, 0, 0};
+  const Mechanism both = join_mechanisms({"K", "L"}, {stands, falls}, {3, 1});
+  EXPECT_EQ(both.run.x, -2);
+  EXPECT_EQ(both.azimuth, 3.1);  // of the one that fell
+  ASSERT_EQ(both.falls.size(), 2u);
+  EXPECT_EQ(both.falls[1].structure, "L");
+  Mechanism other = falls;
+  other.azimuth = 0.2;
+  const Mechanism apart = join_mechanisms({"K", "L"}, {falls, other}, {3, 1});
+  EXPECT_EQ(apart.azimuth, 3.1);
+  EXPECT_NEAR(calc_deviation(apart, 3.1), 2.9, 1e-12);  // of the one that is farthest off
+  EXPECT_NEAR(calc_deviation(apart, 0.2), 2.9, 1e-12);
+  EXPECT_NEAR(calc_deviation(both, 3.0), 0.1, 1e-12);
+}
+
+TEST(Mechanism, RoundOffIsNoSway) {
+  EXPECT_TRUE(judge_mechanism(swinging(0, 0, 1.5, 1e-15), default_knowledge()).is_final);
+  EXPECT_FALSE(judge_mechanism(swinging(0, 0, 1.5), default_knowledge()).is_final);
 }
 
 }  // namespace

@@ -597,8 +597,8 @@ TEST(Run, ALimitThatIsJustBrokenShowsIt) {
       run_plan(read(house(neighbour("near", "9.99 m", "20 m", "clearance = \"4.849 m\"\n"), "0.05 s")),
                default_knowledge(), {}, {});
   EXPECT_EQ(finding(r, "clearance.near").status, record::Status::Bad);
-  EXPECT_THAT(finding(r, "clearance.near").text, testing::HasSubstr(" stands 4.84 m away from the start"));
-  EXPECT_THAT(finding(r, "clearance.near").text, testing::HasSubstr("the limit is 4.85 m."));
+  EXPECT_THAT(finding(r, "clearance.near").text, testing::HasSubstr(" stands 4.840 m away from the start"));
+  EXPECT_THAT(finding(r, "clearance.near").text, testing::HasSubstr("the limit is 4.849 m."));
 }
 
 TEST(Run, ChargesThatFailAreNotCountedAsFired) {

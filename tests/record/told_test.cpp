@@ -12,6 +12,17 @@ TEST(Told, TakesTheSignFromNumbersThatAreZeroAsWritten) {
   EXPECT_EQ(drop_negative_zeros("-0 deg: -0."), "0 deg: 0.");
 }
 
+TEST(Told, AzimuthsLieBetween0And360Degrees) {
+  const double deg = 3.14159265358979323846 / 180;
+  EXPECT_EQ(tell_azimuth(-0.25 * deg, 2), "359.75 deg");
+  EXPECT_EQ(tell_azimuth(-0.25 * deg), "0 deg");
+  EXPECT_EQ(tell_azimuth(359.75 * deg), "0 deg");
+  EXPECT_EQ(tell_azimuth(-90 * deg), "270 deg");
+  EXPECT_EQ(tell_azimuth(360 * deg), "0 deg");
+  EXPECT_EQ(tell_azimuth(-1e-12, 3), "0.000 deg");
+  EXPECT_EQ(tell_azimuth(101.5 * deg, count_digits_of_angle(101.5 * deg)), "101.5 deg");
+}
+
 TEST(Told, LeavesNamesExponentsAndOtherNumbersAlone) {
   for (const char* text : {"-0.05 m", "-0.50", "C-A1-0 and C-A1-0/foot", "1.0e-05 J, 2e-0", "-10", "1.5 - 0.0",
                            "S-A1B2-0", "-0x", "10-0", "-0.0001", "- 0", "towards -x", "-"})

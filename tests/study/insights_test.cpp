@@ -280,7 +280,7 @@ TEST(InsightsReference, BoxOfTheJump) {
   EXPECT_GE(b.box.lower[0] * b.box.lower[1], 800);
   EXPECT_EQ(b.fresh, 149);
   EXPECT_NEAR(b.violating, 1 - std::pow(0.05 / b.tries, 1.0 / 149), 1e-12);
-  EXPECT_NE(tell_guarantee(b).find("not proven"), std::string::npos);
+  EXPECT_NE(tell_guarantee(b, d.forbidden).find("not proven"), std::string::npos);
   // the largest value lies where both inputs are largest; what is left of the runs settles bounds inside
   ASSERT_EQ(b.outputs.size(), 1u);
   for (const uncertainty::LevelBounds& l : b.outputs[0].levels) {
@@ -716,15 +716,18 @@ TEST(Story, TellsOfUsedUpRunsWhatTheyLeftOpen) {
 TEST(Story, GuaranteesNothingOfABoxThatIsBroken) {
   uncertainty::PermissibleBox b;
   b.volume = 0.3, b.samples = 3135, b.broken = 3, b.fresh = 149, b.tries = 4, b.violating = 0.03;
-  EXPECT_EQ(tell_guarantee(b),
+  EXPECT_EQ(tell_guarantee(b, 1),
             "This box was dropped: 3 of the 3135 runs inside violate the requirement. More runs may find a box.");
   b.broken = 0;
-  EXPECT_NE(tell_guarantee(b).find("not finished"), std::string::npos);
+  EXPECT_NE(tell_guarantee(b, 1).find("not finished"), std::string::npos);
   b.volume = 0;
-  EXPECT_NE(tell_guarantee(b).find("too little room"), std::string::npos);
+  EXPECT_NE(tell_guarantee(b, 1).find("too little room"), std::string::npos);
+  EXPECT_EQ(tell_guarantee(b, 0),  // nothing violates
+            "This box was dropped: the runs were used up before it could be checked. More runs may find a box.");
   b.volume = 0.3, b.kept = true;
-  EXPECT_NE(tell_guarantee(b).find("No run violated the requirement in 3135 inside, 149 of them"), std::string::npos);
-  EXPECT_NE(tell_guarantee(b, true).find("constraints"), std::string::npos);
+  EXPECT_NE(tell_guarantee(b, 1).find("No run violated the requirement in 3135 inside, 149 of them"),
+            std::string::npos);
+  EXPECT_NE(tell_guarantee(b, 1, true).find("constraints"), std::string::npos);
 }
 
 TEST(StudyPage, ThinsRunsAndSaysWhichAreThere) {
@@ -797,7 +800,7 @@ TEST(Results, NameEveryColumnAndOutcomeOnce) {
                             }));
   const std::string csv = write_samples_csv(p, r);
   EXPECT_EQ(csv.substr(0, csv.find('\n')), "sample,x1,membership,outcome,membership (output),x1 (output),y,failure");
-  const std::string outcomes = write_outcomes_csv(r);
+  const std::string outcomes = write_outcomes_csv(p, r);
   EXPECT_NE(outcomes.find("\nfailed,"), std::string::npos) << outcomes;
   EXPECT_NE(outcomes.find("\nfailed run,"), std::string::npos) << outcomes;
 }

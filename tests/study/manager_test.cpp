@@ -352,7 +352,7 @@ TEST(Study, IsCompleteOnlyWhereSearchesOfPossibilitiesAre) {
     EXPECT_TRUE(all || limit < 10000);
     EXPECT_EQ(r.alpha.archive.size() < static_cast<std::size_t>(limit) && !all,
               r.ending == uncertainty::Ending::NotConverged && !all);
-    const std::string csv = write_outcomes_csv(r);
+    const std::string csv = write_outcomes_csv(p, r);
     EXPECT_NE(csv.find("necessity,possibility_converged,necessity_converged\nout,"), std::string::npos) << csv;
     EXPECT_EQ(csv.ends_with(all ? ",1,1\n" : ",0,1\n"), true) << csv;
     Store store(name);

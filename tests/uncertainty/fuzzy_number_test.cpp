@@ -23,6 +23,16 @@ TEST(FuzzyNumber, TriangularHasStraightBranches) {
   EXPECT_EQ(f.width(), 35);
 }
 
+TEST(FuzzyNumber, FeetWithoutMembershipAreNotInTheSupport) {
+  const FuzzyNumber f = make_polygonal({{0, 0}, {0.5, 0}, {1, 1}, {2, 0}, {3, 0}});
+  EXPECT_EQ(f.support(), (AlphaCut{0, 0.5, 2}));
+  EXPECT_EQ(f.cut(0), (AlphaCut{0, 0.5, 2}));
+  EXPECT_DOUBLE_EQ(f.membership(0.75), 0.5);
+  EXPECT_EQ(f.membership(0.2), 0);
+  const FuzzyNumber tabulated({{0, 0, 3}, {0, 0.5, 2}, {1, 1, 1}});
+  EXPECT_EQ(tabulated.support(), (AlphaCut{0, 0.5, 2}));
+}
+
 TEST(FuzzyNumber, TrapezoidalKeepsItsCore) {
   const FuzzyNumber f = make_trapezoidal(0, 1, 3, 7);
   EXPECT_EQ(f.core(), (AlphaCut{1, 1, 3}));

@@ -94,8 +94,9 @@ TEST(FuzzyRandomness, QuantilesOfWholeNumbersOfRuns) {
     const auto quantile = [&](double q) { return make_quantile(0, q)(runs); };
     for (int k = 1; k <= n; ++k) EXPECT_NEAR(quantile((k - 0.5) / n), k, 1e-12 * n) << n;
     for (int k = 1; k < n; ++k) EXPECT_NEAR(quantile(static_cast<double>(k) / n), k + 0.5, 1e-12 * n) << n;
-    EXPECT_EQ(quantile(0.1 / n), 1) << "below the first middle";
-    EXPECT_EQ(quantile(1 - 0.1 / n), n) << "above the last";
+    // runs that have failed leave the ends open
+    EXPECT_TRUE(std::isnan(quantile(0.1 / n))) << "below the first middle";
+    EXPECT_TRUE(std::isnan(quantile(1 - 0.1 / n))) << "above the last";
   }
 }
 
@@ -181,7 +182,7 @@ TEST(FuzzyRandomness, StrataOfDifferentCoordinatesAreHardlyCorrelated) {
 TEST(FuzzyRandomness, QuantilesAreThoseOfTheMiddlesOfStrata) {
   std::vector<Result> runs(5);
   for (int k = 0; k < 5; ++k) runs[k].state = Result::State::Done, runs[k].values = {10.0 * ((k * 3) % 5)};
-  for (const auto& [q, value] : {std::pair{0.1, 0.0}, {0.5, 20.0}, {0.6, 25.0}, {0.9, 40.0}, {0.99, 40.0}})
+  for (const auto& [q, value] : {std::pair{0.1, 0.0}, {0.5, 20.0}, {0.6, 25.0}, {0.9, 40.0}})
     EXPECT_DOUBLE_EQ(make_quantile(0, q)(runs), value) << q;
   for (const auto& [side, share] :
        {std::pair{Side::Above, 0.4}, {Side::AtLeast, 0.6}, {Side::Below, 0.4}, {Side::AtMost, 0.6}})
