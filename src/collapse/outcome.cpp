@@ -185,11 +185,11 @@ double rounding_of(const PlacedBox& box) {
   return std::max(1e-5, 0x1p-22 * std::max(std::abs(box.X_WS.p.x), std::abs(box.X_WS.p.y)));
 }
 
-/// Whether a box seen from above overlaps an area by no more than rounding.
+/// Whether a box seen from above overlaps an area by no more than a wall beside it does whose joint closes.
 bool only_touches(const PlacedBox& box, const Polygon& area) {
-  const double rounding = rounding_of(box);
+  constexpr double least = 0.01;  // [m]
   PlacedBox within = box;
-  for (int i = 0; i < 3; ++i) within.half[i] = std::max(0.0, box.half[i] - rounding);
+  for (int i = 0; i < 3; ++i) within.half[i] = std::max(0.0, box.half[i] - least);
   return calc_distance(calc_outline(within), area) > 0;
 }
 

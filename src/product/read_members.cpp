@@ -75,6 +75,9 @@ void mark_storeys(const TableReader& table, const Node& node, std::vector<bool>&
     }
   } else if (node.kind == Node::Kind::Array && !is_nested && !node.items.empty()) {
     for (const Node& item : node.items) mark_storeys(table, item, marked, true);
+  } else if (node.kind == Node::Kind::Array && !is_nested) {
+    table.error("E205", node.place, "storeys: is an empty list",
+                "name at least one storey, or leave storeys out for all");
   } else {
     table.error("E202", node.place, "storeys: is " + name_of(node.kind) + "; storeys are wanted",
                 "write a number such as 0, a range such as \"1..6\", a list of these, or \"all\"");

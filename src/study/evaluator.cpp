@@ -196,6 +196,7 @@ struct Reader {
     const json& outputs = is_nested ? j["outputs"] : j;
     for (const auto& [name, v] : outputs.items()) {
       if (!is_nested && is_known(name)) continue;
+      if (name.empty()) return refuse(find_member(line, name), "an output has no name", form);
       if (!v.is_number() && !v.is_null()) return refuse(find_member(line, name), name + ": a number is wanted", form);
       const double x = v.is_null() ? std::nan("") : v.get<double>();
       if (!std::isfinite(x)) {

@@ -118,7 +118,7 @@ TEST(Approach, WhatOnlyTouchesIsNotOverIt) {
     const Approach touching = find_approach(r, area(2.5));
     EXPECT_EQ(touching.least, 0) << far;
     EXPECT_FALSE(std::isfinite(touching.lowest)) << far;
-    const Approach over = find_approach(r, area(2.49));
+    const Approach over = find_approach(r, area(2.45));
     EXPECT_EQ(over.least, 0) << far;
     EXPECT_NEAR(over.lowest, 0, 1e-6) << far;
     EXPECT_NEAR(find_approach(r, area(2.6)).least, 0.1, 1e-4) << far;

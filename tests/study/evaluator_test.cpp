@@ -109,7 +109,8 @@ TEST(Evaluator, TakesALineThatBreaksOffForNoAnswer) {
 }
 
 TEST(Evaluator, AsksForNumbersOnly) {
-  for (const char* text : {R"({"id":0,"y":1,"note":"text"})", R"({"outputs":{"y":"3"}})", R"({"y":[1]})"}) {
+  for (const char* text : {R"({"id":0,"y":1,"note":"text"})", R"({"outputs":{"y":"3"}})", R"({"y":[1]})", R"({"":1})",
+                           R"({"y":1,"failed":0})", R"({"failed":[]})"}) {
     int id = 0;
     const Answer a = read_answer_line(text, "model", id);
     ASSERT_EQ(a.kind, Kind::Refused) << text;

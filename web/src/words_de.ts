@@ -439,6 +439,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["{n}: is too long", "{}: ist zu lang"],
   ["{n}: holds a control character, such as a line break", "{}: enthält ein Steuerzeichen, etwa einen Zeilenumbruch"],
   ["{n}: is an empty list", "{}: ist eine leere Liste"],
+  ["storeys: is an empty list", "storeys: ist eine leere Liste"],
   ["{n}: holds an empty string", "{}: enthält einen leeren Text"],
   ["{n}: holds a very long string", "{}: enthält einen sehr langen Text"],
   ["fct: cannot be derived from an fc of 8 N/mm2 or less", "fct: lässt sich aus einem fc von 8 N/mm2 oder weniger nicht ableiten"],
