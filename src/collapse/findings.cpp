@@ -357,48 +357,47 @@ void add_rolling_rings(const Context& c) {
   }
 }
 
+void add_direction(const Context& c, const Mechanism& m) {
+  const char *heading = "Fall and debris", *title = "Direction of fall";
+  if (std::isnan(m.azimuth)) {
+    c.add("azimuth", heading, title, "The mass centre moved by less than half a metre to any side.", kNone, "rad");
+    return;
+  }
+  const auto off_plan = [&c](double azimuth) -> std::string {
+    if (!c.map.is_direction_planned) return {};
+    const double planned = std::atan2(c.map.fall_direction.y, c.map.fall_direction.x);
+    const int digits = record::count_digits_of_angle(planned);
+    return fmt::format(", {} deg from the planned {}",
+                       fixed_words(calc_deviation(azimuth, planned) / unit::deg, digits),
+                       record::tell_azimuth(planned, digits));
+  };
+  std::string text;
+  if (m.falls.empty()) {
+    const std::string way = record::tell_azimuth(m.azimuth);
+    text = m.is_azimuth_of_lean ? fmt::format("At {:.2f} s the upper block leans towards {}", m.time, way)
+                                : "The mass centre moved towards " + way;
+    text += off_plan(m.azimuth) + " (0 deg is +x, counter-clockwise).";
+  } else {
+    text = "Of separate structures one by one (0 deg is +x, counter-clockwise).";
+  }
+  for (const Fall& f : m.falls) {
+    const std::string way = record::tell_azimuth(f.azimuth);
+    text += std::isnan(f.azimuth)
+                ? fmt::format(" The mass centre of {} moved by less than half a metre to any side.", f.structure)
+            : f.is_azimuth_of_lean
+                ? fmt::format(" At {:.2f} s {} leans towards {}{}.", f.time, f.structure, way, off_plan(f.azimuth))
+                : fmt::format(" The mass centre of {} moved towards {}{}.", f.structure, way, off_plan(f.azimuth));
+  }
+  if (m.is_azimuth_of_lean || !m.falls.empty())
+    text += fmt::format(" The mass centre moved by {:.1f} m towards {}.", norm(m.run),
+                        record::tell_azimuth(std::atan2(m.run.y, m.run.x)));
+  c.add("azimuth", heading, title, text, m.azimuth, "rad");
+}
+
 Reach add_debris(const Context& c, const Mechanism& m) {
   const size_t last = c.r.time.size() - 1;
   Reach reach = calc_reach(c.r, last);
-  const double planned = std::atan2(c.map.fall_direction.y, c.map.fall_direction.x);
-  if (std::isnan(m.azimuth)) {
-    c.add("azimuth", "Fall and debris", "Direction of fall",
-          "The mass centre moved by less than half a metre to any side.", kNone, "rad");
-  } else if (!m.falls.empty()) {
-    std::string text = "Of separate structures one by one (0 deg is +x, counter-clockwise).";
-    for (const Fall& f : m.falls) {
-      if (std::isnan(f.azimuth)) {
-        text += fmt::format(" The mass centre of {} moved by less than half a metre to any side.", f.structure);
-        continue;
-      }
-      const std::string way = record::tell_azimuth(f.azimuth);
-      text += f.is_azimuth_of_lean ? fmt::format(" At {:.2f} s {} leans towards {}", f.time, f.structure, way)
-                                   : fmt::format(" The mass centre of {} moved towards {}", f.structure, way);
-      if (c.map.is_direction_planned) {
-        Mechanism one;
-        one.azimuth = f.azimuth;
-        const int digits = record::count_digits_of_angle(planned);
-        text +=
-            fmt::format(", {} deg from the planned {}", fixed_words(calc_deviation(one, planned) / unit::deg, digits),
-                        record::tell_azimuth(planned, digits));
-      }
-      text += ".";
-    }
-    c.add("azimuth", "Fall and debris", "Direction of fall", text, m.azimuth, "rad");
-  } else {
-    std::string text = m.is_azimuth_of_lean ? fmt::format("At {:.2f} s the upper block leans towards {}", m.time,
-                                                          record::tell_azimuth(m.azimuth))
-                                            : "The mass centre moved towards " + record::tell_azimuth(m.azimuth);
-    if (c.map.is_direction_planned)
-      text += fmt::format(", {} deg from the planned {}",
-                          fixed_words(calc_deviation(m, planned) / unit::deg, record::count_digits_of_angle(planned)),
-                          record::tell_azimuth(planned, record::count_digits_of_angle(planned)));
-    text += " (0 deg is +x, counter-clockwise).";
-    if (m.is_azimuth_of_lean)
-      text += fmt::format(" The mass centre moved by {:.1f} m towards {}.", norm(m.run),
-                          record::tell_azimuth(std::atan2(m.run.y, m.run.x)));
-    c.add("azimuth", "Fall and debris", "Direction of fall", text, m.azimuth, "rad");
-  }
+  add_direction(c, m);
   std::string text = fmt::format(
       "Beyond the footprint: {:.1f} m towards -x, {:.1f} m towards +x, {:.1f} m towards -y, {:.1f} m towards +y; the "
       "outline of all parts encloses {:.0f} m2.",
@@ -722,8 +721,7 @@ void add_rigid_block(const Context& c) {
           tons, row.size(), moment, way);
     return fmt::format(
         "a rigid block in its place ({:.0f} t on {} plastic hinges of {:.2f} MNm in all, its mass centre {:.2f} m "
-        "ahead "
-        "of them)",
+        "ahead of them)",
         tons, row.size(), moment, way);
   };
   const std::string model_words = words();

@@ -194,13 +194,10 @@ void Builder::make_columns() {
         return;
       }
   };
-  const auto highest_charge = [&](int index) {
-    double highest = 0;
-    for (const product::Stage& stage : plan.stages)
-      for (const product::Charge& c : stage.charges)
-        if (c.member == index && !c.fails) highest = std::max(highest, c.position);
-    return highest;
-  };
+  std::map<int, double> highest_charge;  // column -> centre of the highest that fires [m]
+  for (const product::Stage& stage : plan.stages)
+    for (const product::Charge& c : stage.charges)
+      if (!c.fails) highest_charge[c.member] = std::max(highest_charge[c.member], c.position);
   for (const auto& [at, index] : columns) {
     const Member& m = member(index);
     const product::Section& s = section_of(index);
@@ -228,7 +225,7 @@ void Builder::make_columns() {
     const auto charged = lowest_charge.find(index);
     double split = charged == lowest_charge.end() ? 0 : charged->second;
     // the highest one of those that fire
-    const double clear = low - m.start.z, highest = highest_charge(index);
+    const double clear = low - m.start.z, highest = highest_charge[index];
     if (highest > clear - kUnderJoint + 1e-9) {
       note_too_high(index, highest, clear);
       continue;

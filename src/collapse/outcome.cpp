@@ -170,11 +170,14 @@ Heap find_heap(const record::Record& r, size_t frame) {
   return calc_heap(find_moving_boxes(r, frame), cell);
 }
 
+double calc_deviation(double found, double azimuth) {
+  return std::abs(std::remainder(found - azimuth, 2 * std::numbers::pi));
+}
+
 double calc_deviation(const Mechanism& m, double azimuth) {
-  const auto off = [azimuth](double found) { return std::abs(std::remainder(found - azimuth, 2 * std::numbers::pi)); };
-  double most = off(m.azimuth);
+  double most = calc_deviation(m.azimuth, azimuth);
   for (const Fall& f : m.falls)
-    if (!(off(f.azimuth) <= most) && !std::isnan(f.azimuth)) most = off(f.azimuth);
+    if (const double off = calc_deviation(f.azimuth, azimuth); off > most) most = off;
   return most;
 }
 

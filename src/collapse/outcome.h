@@ -52,6 +52,7 @@ Heap find_heap(const record::Record&, size_t frame);
 /// Between the way it fell and an azimuth, 0 to π; of separate structures that of the one that is farthest off. NaN
 /// where nothing fell to any side [rad].
 double calc_deviation(const Mechanism&, double azimuth);
+double calc_deviation(double found, double azimuth);
 
 inline constexpr double kOnGround = 0.1;  // height of what lies on the ground or on what lies there [m]
 

@@ -429,6 +429,7 @@ bool System::close_cluster(JointCluster& c, double h, bool from_before) {
       joint_answer[r] = answer;
       joint_change[r] = joint_rhs[r];
       joint_impulse[r] += joint_rhs[r];
+      if (!by_rates) continue;
       joint_rate[r] = rate - share * (joint_rate[r] + rate - joint_left_before[r]);
       joint_left_before[r] = rate;
       joint_unforeseen[r] += joint_rate[r];

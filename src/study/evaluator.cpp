@@ -155,11 +155,12 @@ struct Reader {
     }
     Answer a;
     a.kind = Answer::Kind::Done;
-    if (j.contains("failed") && !j["failed"].is_null() && !(j["failed"].is_boolean() && !j["failed"].get<bool>())) {
+    const json failed = j.value("failed", json());
+    if (!failed.is_null() && !failed.is_string() && !failed.is_boolean())
+      return refuse(find_member(line, "failed"), "failed: a text is wanted");
+    if (!failed.is_null() && failed != json(false)) {
       a.kind = Answer::Kind::Failed;
-      a.text = j["failed"].is_string() ? j["failed"].get<std::string>() : "the evaluator says so";
-      if (!j["failed"].is_string() && !j["failed"].is_boolean())
-        return refuse(find_member(line, "failed"), "failed: a text is wanted");
+      a.text = failed.is_string() ? failed.get<std::string>() : "the evaluator says so";
       return a;
     }
     // null stands for what is left out

@@ -37,6 +37,14 @@ std::string cell(const std::string& text) {
   return quoted + "\"";
 }
 
+/// A number in a unit that gives the same bits when it is read with it again, where there is one.
+double read_in(double unit, double x) {
+  const double y = x / unit;
+  for (const double near : {y, std::nextafter(y, -HUGE_VAL), std::nextafter(y, HUGE_VAL)})
+    if (near * unit == x) return near;
+  return y;
+}
+
 double necessity_of(const StudyResult& r, int outcome) { return uncertainty::calc_necessity(r.possibilities, outcome); }
 
 json bounds_json(const uncertainty::OutputBounds& bounds, double unit) {
@@ -462,14 +470,6 @@ std::string write_limits_csv(const Problem& p, const StudyResult& r) {
   }
   if (text.empty()) return text;
   return "output,kind,place,unit,limit,runs,broken,open,possibility_of_breaking,possibility_converged\n" + text;
-}
-
-/// A number in a unit that gives the same bits when it is read with it again, where there is one.
-double read_in(double unit, double x) {
-  const double y = x / unit;
-  for (const double near : {y, std::nextafter(y, -HUGE_VAL), std::nextafter(y, HUGE_VAL)})
-    if (near * unit == x) return near;
-  return y;
 }
 
 std::string write_samples_csv(const Problem& p, const StudyResult& r) {

@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "base/unit.h"
+#include "product/plan_limits.h"
 
 namespace topple::material {
 namespace {
@@ -21,6 +22,16 @@ ConcreteInput make_input(double fc, double Ec, double l_eq) {
 struct Check {
   double fc, Ec, Eci, l_eq, gamma, at_1, at_5, at_10, largest;
 };
+
+// Plans are refused where no curve could be made of them, and nowhere else.
+TEST(KraetzigPoellingLimits, ThePeakStrainsOfPlansAreThoseThatCurvesTake) {
+  ConcreteInput in = make_input(30, 30e3, 100);
+  const double least = product::limits::least_peak_strain * in.fc / in.Ec;
+  in.eps_c1 = least * (1 + 1e-9);
+  EXPECT_NO_THROW(make_concrete(in));
+  in.eps_c1 = least * (1 - 1e-9);
+  EXPECT_THROW(make_concrete(in), InputError);
+}
 
 class KraetzigPoelling : public testing::TestWithParam<Check> {};
 
