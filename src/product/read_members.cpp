@@ -439,7 +439,9 @@ void read_members(Reading& reading, TableReader& root) {
   bool has_rules = false;
   for (const MemberKind kind : {MemberKind::Column, MemberKind::Beam, MemberKind::Slab, MemberKind::Wall}) {
     const std::string key = rule_key(kind);
+    const int errors_before = reading.complaints.error_count();
     const std::vector<const Node*> nodes = root.tables(key);
+    if (reading.complaints.error_count() != errors_before) reading.knows_members = false;
     has_rules = has_rules || root.has(key);
     if (nodes.size() > most_rules) {
       root.error("E209", nodes[most_rules]->place, key + ": more than " + std::to_string(most_rules) + " rules");

@@ -425,6 +425,12 @@ TEST(HangingMembers, ManyOfARuleAreOneComplaint) {
   EXPECT_EQ(said, "E304 line 1: C-A1-1, C-A2-1, C-A3-1 and 3 more: hangs in the air: no column, wall or beam below\n");
 }
 
+TEST(HangingMembers, AreNotToldWhereColumnsCouldNotBeRead) {
+  const std::string beams = "[[beams]]\nsection = \"beam\"\n";
+  EXPECT_EQ(said_about_frame("[columns]\nsection = \"column\"\n" + beams), "");
+  EXPECT_NE(said_about_frame(beams), "");
+}
+
 // ------------------------------------------------------------------------------------------------ blasting concept
 
 std::string with_charges_on(const std::string& members, const std::string& more = "") {
