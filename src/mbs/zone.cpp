@@ -84,7 +84,7 @@ double take_back_crushing(double elongation, ZoneState& z) {
 }  // namespace
 
 double calc_hinge_bearing(const ZoneParameters& p, const CompiledLaws& laws, double time, const ZoneState& z) {
-  return Limits(laws, p.law[0], z, time).capacity(1, z.station[0].strained, z.station[0]);
+  return Limits(laws, p.law[0], z, time).capacity(1, z.station[0]);
 }
 
 void begin_switch(const ZoneParameters& p, const CompiledLaws& laws, const LawSwitch& to, ZoneState& z) {
@@ -98,11 +98,14 @@ void begin_switch(const ZoneParameters& p, const CompiledLaws& laws, const LawSw
   for (int s = 0; s < p.stations; ++s) {
     StationState& st = z.station[s];
     const int before = z.base_law < 0 ? p.law[s] : z.base_law;
+    st.outgoing_measure = 1;
     if (st.reached == 0 || laws[static_cast<size_t>(before)].rotation_ratio == ratio) continue;
     // in the direction in which it stands
     const double about_y = st.phi[0] - st.bow[0], about_z = st.phi[1] - st.bow[1],
                  length = std::hypot(about_y, about_z);
+    const double was = st.strained;
     st.strained = length > 0 ? st.reached * std::hypot(about_y, ratio * about_z) / length : st.reached;
+    st.outgoing_measure = st.strained > 0 ? was / st.strained : 1;
   }
 }
 
@@ -425,18 +428,18 @@ struct Evaluation {
 
   /// Flow along the axis. Returns the share of the section that is still there.
   double flow_axially(const Limits& limits) {
-    const double strained = most_strained(z);
+    const StationState& strained = most_strained(z);
     double integrity = limits.integrity(z.shortened);
     z.crushed = 0;
     if (p.external_axial) {
       // held by somebody else
     } else if (force[0] < 0) {
-      double limit = limits.compression(strained, z.shortened, integrity, z.station[0]);
+      double limit = limits.compression(strained, z.shortened, integrity);
       if (-force[0] > limit) {
         double shortening = (-force[0] - limit) / k[0];
         const auto shorten_under = [&](double by) {
           integrity = limits.integrity(z.shortened + by);
-          limit = limits.compression(strained, z.shortened + by, integrity, z.station[0]);
+          limit = limits.compression(strained, z.shortened + by, integrity);
           shortening = std::max(0.0, (-force[0] - limit) / k[0]);
           return shortening - by;
         };

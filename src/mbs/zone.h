@@ -26,6 +26,7 @@ struct StationState {
   double tangent[2] = {0, 0};        // rise of the rotation with the moment in the last evaluation, for the equilibrium
   double reached = 0;                // largest inelastic rotation so far, without that of cracks [rad]
   double strained = 0;               // the same as the edges feel it: of rotations about y that strain them as much
+  double outgoing_measure = 1;       // times that, as the law counts it from which a switch goes
   int k[2] = {0, 0}, j[2] = {0, 0};  // lookup hints
 };
 

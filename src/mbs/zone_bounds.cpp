@@ -93,7 +93,7 @@ void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const L
   const double whole = limits.integrity(z.shortened);
   double from = normal_force - reach, to = normal_force + reach;
   if (!p.external_axial) {
-    from = std::max(from, -limits.compression(most_strained(z), z.shortened, whole, z.station[0]));
+    from = std::max(from, -limits.compression(most_strained(z), z.shortened, whole));
     to = std::min(to, limits.tension(z.elongated, z.shortened));
   }
   for (int s = 0; s < p.stations; ++s)
@@ -325,9 +325,8 @@ double calc_utilisation(const ZoneParameters& p, const CompiledLaws& laws, doubl
   force[0] = z.normal_force;
   const double integrity = limits.integrity(z.shortened);
   double u = p.external_axial ? 0.0
-             : force[0] < 0
-                 ? ratio(-force[0], limits.compression(most_strained(z), z.shortened, integrity, z.station[0]))
-                 : ratio(force[0], limits.tension(z.elongated, z.shortened));
+             : force[0] < 0   ? ratio(-force[0], limits.compression(most_strained(z), z.shortened, integrity))
+                              : ratio(force[0], limits.tension(z.elongated, z.shortened));
   for (int s = 0; s < p.stations; ++s) {
     const Limits station_limits(laws, p.law[s], z, time);
     StationState st = z.station[s];
@@ -348,7 +347,7 @@ double calc_utilisation(const ZoneParameters& p, const CompiledLaws& laws, doubl
 }
 
 bool is_softening(const ZoneParameters& p, const CompiledLaws& laws, double time, const ZoneState& z) {
-  if (!z.live || p.stations == 0 || (z.shortened == 0 && most_strained(z) == 0)) return false;
+  if (!z.live || p.stations == 0 || (z.shortened == 0 && most_strained(z).strained == 0)) return false;
   const Limits limits(laws, p.law[0], z, time);
   const double integrity = limits.integrity(z.shortened);
   if (integrity < 0.95) return true;

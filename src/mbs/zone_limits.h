@@ -16,6 +16,7 @@ class Limits {
   Limits(const CompiledLaws& laws, int law, const ZoneState& z, double time)
       : from_(laws[static_cast<size_t>(z.base_law < 0 ? law : z.base_law)]), to_(from_), hinge_bears_(z.hinge_bears) {
     if (z.next_law < 0) return;
+    is_switching_ = true;
     to_ = laws[static_cast<size_t>(z.next_law)];
     share_ = z.ramp > 0 ? std::clamp((time - z.ramp_begin) / z.ramp, 0.0, 1.0) : 1.0;
   }
@@ -31,24 +32,26 @@ class Limits {
     return blend([&](const CompiledLaw& l) { return calc_integrity(l, shortened); });
   }
   /// Largest compression after a rotation and a plastic shortening, a hinge of the same member included.
-  ///   near  a station that has turned about as far
-  double compression(double rotation, double shortened, double integrity, const StationState& near) const {
+  double compression(const StationState& s, double shortened, double integrity) const {
     const double own = blend([&](const CompiledLaw& l) {
-      return std::min(
-          calc_curve(l.compression, shortened),
-          (l.elongates ? 1 : integrity) * std::min(calc_compression_capacity(l.moment[0], rotation, near.j[0]),
-                                                   calc_compression_capacity(l.moment[1], rotation, near.j[1])));
+      return std::min(calc_curve(l.compression, shortened),
+                      (l.elongates ? 1 : integrity) *
+                          std::min(calc_compression_capacity(l.moment[0], strained_under(l, s, s.strained), s.j[0]),
+                                   calc_compression_capacity(l.moment[1], strained_under(l, s, s.strained), s.j[1])));
     });
     return std::min(own, hinge_bears_);
   }
   /// That of a whole section which has turned about this axis alone.
-  double capacity(int axis, double rotation, const StationState& near) const {
-    return blend(
-        [&](const CompiledLaw& l) { return calc_compression_capacity(l.moment[axis], rotation, near.j[axis]); });
+  double capacity(int axis, const StationState& s) const {
+    return blend([&](const CompiledLaw& l) {
+      return calc_compression_capacity(l.moment[axis], strained_under(l, s, s.strained), s.j[axis]);
+    });
   }
   MomentLimit moment(int axis, double normal_force, StationState& s) const {
     MomentLimit a{0, 0}, b{0, 0};
-    if (share_ < 1) a = calc_moment_limit(from_.get().moment[axis], normal_force, s.strained, s.k[axis], s.j[axis]);
+    if (share_ < 1)
+      a = calc_moment_limit(from_.get().moment[axis], normal_force, strained_under(from_.get(), s, s.strained),
+                            s.k[axis], s.j[axis]);
     if (share_ > 0) {
       int k = 0, j = 0;
       b = calc_moment_limit(to_.get().moment[axis], normal_force, s.strained, k, j);
@@ -58,7 +61,9 @@ class Limits {
   /// Rise of the limits with the normal force.
   MomentLimit slope(int axis, double normal_force, const StationState& s) const {
     MomentLimit a{0, 0}, b{0, 0};
-    if (share_ < 1) a = calc_moment_slope(from_.get().moment[axis], normal_force, s.strained, s.k[axis], s.j[axis]);
+    if (share_ < 1)
+      a = calc_moment_slope(from_.get().moment[axis], normal_force, strained_under(from_.get(), s, s.strained),
+                            s.k[axis], s.j[axis]);
     if (share_ > 0) b = calc_moment_slope(to_.get().moment[axis], normal_force, s.strained, 0, 0);
     return {mix(a.positive, b.positive), mix(a.negative, b.negative)};
   }
@@ -86,7 +91,9 @@ class Limits {
   bool elongates() const { return from_.get().elongates || to_.get().elongates; }
   Lift lift(int axis, double normal_force, double rotation, StationState& s) const {
     Lift a, b;
-    if (share_ < 1) a = calc_lift(from_.get().moment[axis], normal_force, rotation, s.k[axis], s.j[axis]);
+    if (share_ < 1)
+      a = calc_lift(from_.get().moment[axis], normal_force, strained_under(from_.get(), s, rotation), s.k[axis],
+                    s.j[axis]);
     if (share_ > 0) {
       int k = 0, j = 0;
       b = calc_lift(to_.get().moment[axis], normal_force, rotation, k, j);
@@ -117,13 +124,20 @@ class Limits {
     if (share_ >= 1) return f(to_.get());
     return mix(f(from_.get()), f(to_.get()));
   }
+  /// What the edges feel of a rotation, in the measure of one of the laws: it is kept in that of the law that comes.
+  double strained_under(const CompiledLaw& l, const StationState& s, double strained) const {
+    return is_switching_ && &l == &from_.get() ? s.outgoing_measure * strained : strained;
+  }
   std::reference_wrapper<const CompiledLaw> from_, to_;
+  bool is_switching_ = false;
   double share_ = 0;
   double hinge_bears_;
 };
 
-/// What the rotations of the stations have strained at most, a missing station nothing [rad].
-inline double most_strained(const ZoneState& z) { return std::max(z.station[0].strained, z.station[1].strained); }
+/// The station whose rotation has strained its edges most; a missing one has not turned.
+inline const StationState& most_strained(const ZoneState& z) {
+  return z.station[z.station[1].strained > z.station[0].strained ? 1 : 0];
+}
 
 /// Cracks grow a little ahead of their moment, so that not every step has to see to them and dead load leaves them at
 /// rest.
