@@ -2,6 +2,7 @@
 /// Inside of make_model: bodies first (manager.cpp), then connections (connections.cpp), then events (charges.cpp).
 
 #include <array>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <string>
@@ -28,6 +29,11 @@ struct MemberStation {
   int zone = -1;     // as prepared, in the library
   int damaged = -1;  // beside a fired charge; -1 if none is near
 };
+
+/// Whether a station is nearer than the other one, by more than round-off.
+inline bool is_nearer(double station, double other, double to) {
+  return std::abs(to - station) < std::abs(to - other) - 1e-9;
+}
 
 /// Columns and beams: what their force elements are made of.
 struct MemberZones {

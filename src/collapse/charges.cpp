@@ -162,8 +162,7 @@ void Builder::add_events(std::vector<Firing> schedule) {
     if (m.kind == MemberKind::Column && !lowest_charge.count(c.member)) from = m.start[axis];
     const double to = m.start[axis] + c.position + 0.5 * c.destroyed_length;
     int which = 0;
-    if (m.kind == MemberKind::Beam && std::abs(c.position - z.station[1].at) < std::abs(c.position - z.station[0].at))
-      which = 1;
+    if (m.kind == MemberKind::Beam && is_nearer(z.station[1].at, z.station[0].at, c.position)) which = 1;
     const bool is_beam = m.kind == MemberKind::Beam;
     // a piece between a gap and a joint that is no longer than those that cut_member takes along
     const auto reaches = [&](int end) {

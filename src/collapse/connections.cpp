@@ -145,8 +145,7 @@ void Builder::request_station(int index, int which) {
   in.length = calc_zone_length(s, in.concrete, in.steel, depth, z.clear_length, k);
   for (const product::Weakening& w : m.weakenings) {
     // the nearer station has it; the first one when both are as near
-    const double here = std::abs(w.at - station.at), there = std::abs(w.at - other.at);
-    if (here > there || (here == there && which == 1)) continue;
+    if (which == 0 ? is_nearer(other.at, station.at, w.at) : !is_nearer(station.at, other.at, w.at)) continue;
     in.cut_bars = std::max(in.cut_bars, w.cut_bars);
     in.cut_concrete = std::max(in.cut_concrete, w.cut_concrete);
   }
@@ -157,7 +156,7 @@ void Builder::request_station(int index, int which) {
     for (const product::Charge& c : stage.charges) {
       if (c.member != index || c.fails || !(c.transition_damage > 0)) continue;
       const bool acts_here =
-          is_column ? which == 0 : std::abs(c.position - station.at) <= std::abs(c.position - other.at);
+          is_column ? which == 0 : which == (is_nearer(z.station[1].at, z.station[0].at, c.position) ? 1 : 0);
       const double gap = std::abs(c.position - station.at) - 0.5 * c.destroyed_length;
       if (acts_here || gap > k.charge_transition_reach * depth) continue;
       in.concrete_loss = std::max(in.concrete_loss, c.transition_damage);
@@ -285,6 +284,7 @@ mbs::SharedLaw Builder::make_hinge_law(int zone, const Stiffness& s, const std::
   std::swap(law.moment_y.positive, law.moment_y.negative);
   std::swap(law.moment_y.elongation_positive, law.moment_y.elongation_negative);
   std::swap(law.shear_y, law.shear_z);
+  law.rotation_ratio = 1 / law.rotation_ratio;
   return law;
 }
 
@@ -527,10 +527,12 @@ void Builder::connect_slab(const GridPoint& at, int index) {
     }
   }
   if (beam[0] >= 0 && beam[1] >= 0) {
-    const double width = span_x - half[0][0].x - half[0][1].x;
+    // clear of the joints on both sides
+    const double left = std::max(half[0][0].x, half[1][0].x), right = std::max(half[0][1].x, half[1][1].x),
+                 width = span_x - left - right;
     // between edges that do not turn its middle bears w s^2 / 24 of its weight, the edges w s^2 / 12
-    join(m.name, beam[0], beam[1], {m.start.x + half[0][0].x + 0.5 * width, middle.y, middle.z}, y_beam_axes(), width,
-         span_y, false, plan.analysis.gravity * mass_of_slab(at, index) * span_y / 24);
+    join(m.name, beam[0], beam[1], {m.start.x + left + 0.5 * width, middle.y, middle.z}, y_beam_axes(), width, span_y,
+         false, plan.analysis.gravity * mass_of_slab(at, index) * span_y / 24);
     return;
   }
   // between joints it is held at their faces and turns there

@@ -20,6 +20,8 @@ using product::MemberKind;
 
 constexpr double kUnderJoint = 0.02;  // a charge in a column is at least so far below its joint [m]
 
+bool is_along_x(const Vec3& d) { return std::abs(d.x) >= std::abs(d.y) * (1 - 1e-9); }
+
 Mat3 column_axes() { return Mat3::from_columns({0, 0, 1}, {1, 0, 0}, {0, 1, 0}); }
 Mat3 x_beam_axes() { return Mat3::identity(); }
 Mat3 y_beam_axes() { return Mat3::from_columns({0, 1, 0}, {-1, 0, 0}, {0, 0, 1}); }
@@ -95,12 +97,12 @@ void Builder::find_direction() {
     if (n_standing > 0 && n_all > n_standing) {
       const Vec3 d = (1.0 / n_all) * all - (1.0 / n_standing) * standing;
       if (std::abs(d.x) > 1e-6 || std::abs(d.y) > 1e-6)
-        azimuth = std::abs(d.x) >= std::abs(d.y) ? std::atan2(0.0, d.x) : std::atan2(d.y, 0.0);
+        azimuth = is_along_x(d) ? std::atan2(0.0, d.x) : std::atan2(d.y, 0.0);
     }
   }
   map.fall_direction = {std::cos(azimuth), std::sin(azimuth), 0};
   map.hinge_axis = cross({0, 0, 1}, map.fall_direction);
-  hinge_about_y = (std::abs(map.fall_direction.x) >= std::abs(map.fall_direction.y)) == (heads == Heads::OfTheFall);
+  hinge_about_y = is_along_x(map.fall_direction) == (heads == Heads::OfTheFall);
   map.hinge_about_y = hinge_about_y;
 }
 

@@ -118,6 +118,9 @@ struct ModelMap {
 /// A warning (W513) where a span bears less than its dead load, at the member that bears least of it.
 std::vector<Diagnostic> complain_of_spans(const product::Plan&, const ModelMap&);
 
+/// Whether the grid's x is nearer to a horizontal direction than its y; x also where both are as near, to round-off.
+bool is_along_x(const Vec3&);
+
 /// About which axis of the grid the heads of ground columns turn: that of the fall, or the other one.
 enum class Heads { OfTheFall, Across };
 

@@ -749,6 +749,28 @@ TEST(Manager, WhatWasTakenOutCoversNoMember) {
   EXPECT_GT(with, none);
 }
 
+TEST(Manager, AnOblongColumnTurnsAlikeInFallsAlongBothAxes) {
+  const auto head = [](const std::string& size, const std::string& azimuth) {
+    std::string text = materials();
+    text.replace(text.find("width = \"30 cm\"\nheight = \"40 cm\""), 32, size);
+    const Built b = build(read(text + grid("A = \"0 m\", B = \"5 m\"", "1 = \"0 m\", 2 = \"5 m\"", 1) +
+                               "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n"
+                               "[criteria]\nazimuth = \"" +
+                               azimuth + "\"\nazimuth_tolerance = \"15 deg\"\n" + analysis()));
+    return b.model.laws[static_cast<size_t>(b.model.rotational_elements.front().law.index)];
+  };
+  const mbs::ZoneLaw along_x = head("width = \"30 cm\"\nheight = \"90 cm\"", "180 deg"),
+                     along_y = head("width = \"90 cm\"\nheight = \"30 cm\"", "270 deg");
+  EXPECT_GT(std::abs(std::log(along_x.rotation_ratio)), 0.7);
+  EXPECT_NEAR(along_y.rotation_ratio / along_x.rotation_ratio, 1, 1e-9);
+  EXPECT_NEAR(along_y.shear_y / along_x.shear_y, 1, 1e-9);
+  for (const auto family : {&mbs::ZoneLaw::moment_y, &mbs::ZoneLaw::moment_z}) {
+    const mbs::MomentFamily &x = along_x.*family, &y = along_y.*family;
+    ASSERT_EQ(x.positive.size(), y.positive.size());
+    for (size_t i = 0; i < x.positive.size(); ++i) EXPECT_NEAR(y.positive[i], x.positive[i], 1e-6 * 100e3);
+  }
+}
+
 /// A charge that fires late, with its middle at this height [m].
 std::string late_charge_at(const std::string& members, double at) {
   std::string text = charge(members, "0.5 s");

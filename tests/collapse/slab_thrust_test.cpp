@@ -24,7 +24,8 @@ namespace {
 constexpr double kColumn = 0.4, kWidth = 0.3, kDepth = 0.5, kSlab = 0.15, kHeight = 3, kLoad = 4e3;  // [m], [N/m2]
 
 struct Floor {
-  std::vector<double> x, y;  // of rows and frames [m]
+  std::vector<double> x, y;          // of rows and frames [m]
+  std::vector<std::string> broad{};  // columns that are 1.2 m broad along x, as "A1"
 };
 
 product::Plan plan_of(const Floor& f) {
@@ -37,9 +38,15 @@ product::Plan plan_of(const Floor& f) {
   };
   std::string text = materials();
   text.replace(text.find("width = \"30 cm\"\nheight = \"40 cm\""), 32, "width = \"40 cm\"\nheight = \"40 cm\"");
-  return read(text + grid(list(f.x, 'A'), list(f.y, '1'), 1, "4 kN/m2") +
+  const size_t begin = text.find("[section.column]");
+  std::string broad = text.substr(begin, text.find("\n[", begin) + 1 - begin);
+  broad.replace(broad.find("column"), 6, "broad").replace(broad.find("40 cm"), 5, "120 cm");
+  std::string overrides;
+  for (const std::string& at : f.broad)
+    overrides += "[[override]]\nmembers = \"C-" + at + "-0\"\nsection = \"broad\"\n";
+  return read(text + broad + grid(list(f.x, 'A'), list(f.y, '1'), 1, "4 kN/m2") +
               "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n[[slabs]]\npanel = \"floor\"\n" +
-              analysis());
+              overrides + analysis());
 }
 
 /// Forces of the elements at rest, in their axes [N].
@@ -208,14 +215,14 @@ std::string mirror(std::string name, const Floor& f, bool in_x) {
   return name + rest;
 }
 
-TEST(SlabThrust, AFloorIsTheSameInAMirror) {
-  const Floor f{{0, 4, 9.5}, {0, 4, 9, 15}};
+void expect_the_same_in_a_mirror(const Floor& f) {
   const std::map<std::string, Vec3> force = find_element_forces(f);
   for (const bool in_x : {false, true}) {
     Floor other = f;
     std::vector<double>& at = in_x ? other.x : other.y;
     std::reverse(at.begin(), at.end());
     for (double& place : at) place = (in_x ? f.x : f.y).back() - place;
+    for (std::string& column : other.broad) column = mirror("C-" + column, f, in_x).substr(2);
     const std::map<std::string, Vec3> there = find_element_forces(other);
     ASSERT_EQ(there.size(), force.size());
     double thrust = 0;
@@ -230,6 +237,12 @@ TEST(SlabThrust, AFloorIsTheSameInAMirror) {
     }
     EXPECT_GT(thrust, 50e3);
   }
+}
+
+TEST(SlabThrust, AFloorIsTheSameInAMirror) { expect_the_same_in_a_mirror({{0, 4, 9.5}, {0, 4, 9, 15}}); }
+
+TEST(SlabThrust, AFloorOnUnlikeColumnsIsTheSameInAMirror) {
+  expect_the_same_in_a_mirror({{0, 4, 9.5}, {0, 4, 9, 15}, {"A1", "C1", "B2", "C4"}});
 }
 
 }  // namespace
