@@ -21,25 +21,38 @@ double calc_tilt(const Quat& q, const Vec3& fall_direction) {
 
 namespace {
 
-/// The block at a time, on its way from one frame to the next.
+/// On the way from one motion to another of the same bodies, and on behind it for a share of more than 1.
+BlockFrame::Motion calc_between(const BlockFrame::Motion& a, const BlockFrame::Motion& b, double share) {
+  return {normalized(exp_rotation(share * log_rotation(b.rotation * conjugate(a.rotation))) * a.rotation),
+          a.displacement + share * (b.displacement - a.displacement), a.above};
+}
+
+/// The block at a time, as it was at the frame before: what breaks on the ground until the next one has not broken yet.
+/// Its motion is on the way to the next frame, or goes on from the last two where the next one has another block.
 BlockFrame find_block(const std::vector<BlockFrame>& frames, double time) {
   const auto after = std::find_if(frames.begin(), frames.end(), [time](const BlockFrame& f) { return f.time >= time; });
   if (after == frames.end()) return frames.back();
-  BlockFrame at = *after;
-  if (after == frames.begin() || after->time == time) return at;
-  const BlockFrame& before = *(after - 1);
-  const double share = (time - before.time) / (after->time - before.time);
+  if (after == frames.begin() || after->time == time) return *after;
+  const auto before = after - 1;
+  BlockFrame at = *before;
   at.time = time;
-  const auto between = [share](const Quat& a, const Quat& b) {
-    return normalized(exp_rotation(share * log_rotation(b * conjugate(a))) * a);
+  const auto share_from = [time](const BlockFrame& a, const BlockFrame& b) {
+    return (time - a.time) / (b.time - a.time);
   };
-  at.rotation = between(before.rotation, after->rotation);
-  at.displacement = before.displacement + share * (after->displacement - before.displacement);
-  if (before.pieces.above > 0) {
-    at.pieces.rotation = between(before.pieces.rotation, after->pieces.rotation);
-    at.pieces.displacement =
-        before.pieces.displacement + share * (after->pieces.displacement - before.pieces.displacement);
-  }
+  at.pieces = calc_between(before->pieces, after->pieces, share_from(*before, *after));
+  constexpr double rounding = 1e-9;
+  const auto are_alike = [](const BlockFrame& a, const BlockFrame& b) {
+    return std::abs(a.connected - b.connected) < rounding;
+  };
+  const auto move = [&](const BlockFrame& a, const BlockFrame& b) {
+    const BlockFrame::Motion block =
+        calc_between({a.rotation, a.displacement, a.above}, {b.rotation, b.displacement, b.above}, share_from(a, b));
+    at.rotation = block.rotation, at.displacement = block.displacement;
+  };
+  if (are_alike(*before, *after))
+    move(*before, *after);
+  else if (before != frames.begin() && are_alike(*(before - 1), *before))
+    move(*(before - 1), *before);
   return at;
 }
 

@@ -25,7 +25,7 @@ struct BlockFrame {
   Quat rotation;         // as Motion has it, of the block
   Vec3 displacement;     //
   double above = 0;      //
-  Motion pieces;         // of all upper bodies, where the block holds less than mechanism.coherent_share of their mass
+  Motion pieces;         // of all upper bodies
   double connected = 1;  // mass of the block over the mass of all upper bodies
   double moved = 0;      // share of all moving mass of the structure that has gone farther than it may, to any side
   double down = 0;       // share of it that has come down

@@ -270,9 +270,9 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
     const BlockFrame::Motion block =
         find_motion(group[largest], [&](int b) { return linked.find(b) == static_cast<int>(largest); });
     f.rotation = block.rotation, f.displacement = block.displacement, f.above = block.above;
-    if (f.connected < k_.mechanism_coherent_share)
-      f.pieces = find_motion(
-          upper[s], [&](int b) { return map_.bodies[static_cast<size_t>(b)].structure == static_cast<int>(s); });
+    f.pieces = f.connected == 1 ? block : find_motion(upper[s], [&](int b) {
+      return map_.bodies[static_cast<size_t>(b)].structure == static_cast<int>(s);
+    });
   }
   return out;
 }

@@ -77,6 +77,41 @@ TEST(Mechanism, WhatIsInPiecesIsJudgedByAllOfThem) {
   EXPECT_EQ(name_of(in), "vertical");
 }
 
+TEST(Mechanism, ABlockThatHoldsTogetherByLittleIsNearWhatAllOfItDoes) {
+  // its largest part has 52 %, and a bound of 55 % would have all of it judged, which leans alike
+  MechanismInput in = synthetic(0.2, 0, 1);
+  for (BlockFrame& f : in.frames) take_apart(f, 0.52);
+  EXPECT_EQ(name_of(in), "topple");
+  for (const NearVerdict& near : find_near_verdicts(in, default_knowledge()))
+    EXPECT_NE(near.rule, "mechanism.coherent_share") << near.as.name;
+}
+
+TEST(Mechanism, WhatBreaksOnTheGroundIsJudgedAsItCameDown) {
+  // between frames of 1/60 s the block touches the ground, and then has another part as its largest one
+  const auto coming_down = [](double time) {
+    BlockFrame f;
+    f.time = time;
+    f.rotation = exp_rotation({0, -0.2 * time, 0});
+    f.displacement = {-0.5 * time, 0, -2 * time};
+    f.height = 12 - f.displacement.z;
+    take_apart(f, 0.95);
+    return f;
+  };
+  MechanismInput in = synthetic(0.2, 0, 1);
+  in.frames = {coming_down(0), coming_down(1 - 1.0 / 60), coming_down(1)};
+  in.touchdown = 1 - 0.9 / 60;
+  BlockFrame& after = in.frames.back();
+  after.connected = 0.51, after.moved = after.down = 1;
+  after.rotation = exp_rotation({0, -0.6, 0});
+  after.displacement = {-2, 0, -4};
+  after.forward = after.backward = 0.5;  // parts turn either way
+  const Mechanism m = judge_mechanism(in, default_knowledge());
+  EXPECT_EQ(m.name, "topple");
+  EXPECT_NEAR(m.connected, 0.95, 1e-12);
+  EXPECT_NEAR(m.tilt, 0.2 * in.touchdown, 1e-9);
+  EXPECT_NEAR(m.drop, 2 * in.touchdown, 1e-9);
+}
+
 TEST(Mechanism, FoldsAboutEitherAxis) {
   MechanismInput in = synthetic(0.1, 1, 1);
   EXPECT_NE(name_of(in), "fold");
