@@ -217,7 +217,9 @@ Approach find_approach(const record::Record& r, const Polygon& area, const std::
         if (at_least > 0 && at_least >= out.least) continue;
         double d = calc_distance(calc_outline(box), area);
         if (d < rounding_of(box)) d = 0;
-        if (d < out.least) out.least = d, out.when = r.time[f], out.body = b;
+        // round-off of what stands is no way
+        if (d < out.least - (std::isfinite(out.least) ? rounding_of(box) : 0))
+          out.least = d, out.when = r.time[f], out.body = b;
         if (d > 0 || only_touches(box, area)) continue;
         const double height = calc_lowest_over(box, area);
         if (height < out.lowest) out.lowest = height, out.lowest_when = r.time[f], out.lowest_body = b;

@@ -102,8 +102,10 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
   if (!plan.storey_heights.empty()) {
     add("Building", "Storeys", std::to_string(plan.storey_heights.size()));
     add("Building", "Heights of storeys", join_runs(plan.storey_heights, "m"));
+    std::vector<double> loads;
+    for (const double load : plan.storey_loads) loads.push_back(1e-3 * unit::gravity * load);
     if (std::ranges::any_of(plan.storey_loads, [](double load) { return load > 0; }))
-      add("Building", "Loads on floors", join_runs(plan.storey_loads, "kg/m2"));
+      add("Building", "Loads on floors", join_runs(loads, "kN/m2"));
   }
   for (const product::Member& m : plan.members) {
     if (m.shaft < 0) continue;
@@ -114,8 +116,12 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
             m.end.z - m.start.z, s.diameter_foot, s.diameter_top, s.thickness_foot / unit::cm,
             s.thickness_top / unit::cm));
   }
-  if (!plan.storey_heights.empty())
-    add("Building", "Height", fmt::format("{:.2f} m", plan.level(static_cast<int>(plan.storey_heights.size()) - 1)));
+  if (!plan.storey_heights.empty()) {
+    double height = plan.level(static_cast<int>(plan.storey_heights.size()) - 1);
+    for (const product::Member& m : plan.members)
+      if (m.shaft >= 0) height = std::max(height, m.end.z);
+    add("Building", "Height", fmt::format("{:.2f} m", height));
+  }
   add("Building", "Mass", fmt::format("{:.0f} t", calc_standing_mass(plan) / unit::t));
   for (const product::Concrete& c : plan.concretes)
     add("Materials", "Concrete " + c.name,
