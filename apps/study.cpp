@@ -76,6 +76,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   options.source = text;
   options.source_name = a.input;
   options.rerun_failed = a.study.rerun_failed;
+  options.is_new = place.is_new;
   options.accepted = [&] {
     keep_place(a.output, place);
     if (problem.random) std::fprintf(stderr, "%s\n", study::tell_random_cost(problem).c_str());

@@ -105,6 +105,8 @@ StudyPlace choose_place(const Arguments& a) {
       refuse(fmt::format("the study \"{}\" of {}, not \"{}\" of {}", there.name, there.store, place.name, store));
   } else if (fs::exists(folder / store_file, failure)) {
     refuse("a study in a file");
+  } else {
+    place.is_new = true;
   }
   return place;
 }

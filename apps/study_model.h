@@ -14,6 +14,7 @@ namespace topple::apps {
 struct StudyPlace {
   std::string store;
   std::string name = "main";
+  bool is_new = false;  // on a server, and its folder knows of none
 };
 
 /// For a new study, or one to go on with; makes the folder if nothing is wrong. Throws InputError E801, E820, E822

@@ -112,6 +112,13 @@ std::string make_study_definition(const Problem& p, const StudyOptions& options)
   return d.dump();
 }
 
+/// Whether two definitions are those of one study; its file may lie elsewhere.
+bool are_alike(const std::string& a, const std::string& b) {
+  json one = json::parse(a), other = json::parse(b);
+  one.erase("file"), other.erase("file");
+  return one == other;
+}
+
 /// Hashes of the answers whose outputs, or the length of whose trajectories, are not those of most others: an older
 /// version kept them.
 std::vector<std::string> find_strangers(const std::vector<StoredResult>& results) {
@@ -195,6 +202,9 @@ class Manager {
         store_(options.store, progress.cancel, options.pool.patience) {
     const auto there = store_.find_study(options.name);
     if (there && there->model != model_) refuse(*there);
+    if (there && options.is_new && !are_alike(there->definition, make_study_definition(problem, options)))
+      throw InputError("E822", fmt::format("{} holds another study \"{}\"", hide_password(options.store), options.name),
+                       "give another --name, or go on in that study's own folder");
     std::vector<StoredResult> results = store_.load_results(model_);
     const std::vector<std::string> strangers = find_strangers(results);
     // what is refused changes nothing
@@ -676,7 +686,7 @@ StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row
     std::erase_if(results, [&hash](const StoredResult& s) { return s.hash == hash; });
   StudyResult r;
   r.is_finished = row.state == "finished";
-  const json summary = json::parse(row.summary.empty() ? "{}" : row.summary);
+  json summary = json::parse(row.summary.empty() ? "{}" : row.summary);
   // in the order in which the analysis met them, if that is known
   if (summary.contains("order")) {
     std::unordered_map<std::string, std::size_t> place;
@@ -684,6 +694,8 @@ StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row
     std::erase_if(results, [&](const StoredResult& s) { return !place.contains(s.hash); });
     std::sort(results.begin(), results.end(),
               [&](const StoredResult& a, const StoredResult& b) { return place.at(a.hash) < place.at(b.hash); });
+    // without all of its runs nothing that was found of them holds
+    if (results.size() < place.size()) r.is_finished = false, summary = json::object();
   } else {
     const uncertainty::Box support = uncertainty::make_box(problem.space, 0);
     std::erase_if(results, [&](const StoredResult& s) { return !belongs_to(problem, support, s.inputs); });

@@ -24,6 +24,7 @@ struct StudyOptions {
   std::string source_name;
   PoolOptions pool;  // own workers; no jobs: only those of other processes
   bool rerun_failed = false;
+  bool is_new = false;             // a study of this name in the store must be the same one
   std::function<void()> accepted;  // called once the store holds the study, before anything is run; may be empty
 };
 

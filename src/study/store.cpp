@@ -589,6 +589,10 @@ std::optional<AnswerForm> Store::find_form(const std::string& model) {
 void Store::rerun(const std::vector<std::string>& hashes) {
   const std::string list = json(hashes).dump();
   transact([&](bool) {
+    db_->run(fmt::format("UPDATE study SET state = 'open', summary = '' WHERE model IN (SELECT model FROM job WHERE "
+                         "hash IN {})",
+                         db_->dialect().listed),
+             {list});
     db_->run(fmt::format("DELETE FROM result WHERE hash IN {}", db_->dialect().listed), {list});
     db_->run(fmt::format("UPDATE job SET state = 'waiting', attempt = 0, vanished = 0, worker = NULL, message = NULL "
                          "WHERE hash IN {}",
@@ -600,6 +604,10 @@ void Store::rerun(const std::vector<std::string>& hashes) {
 
 int Store::rerun_failed(const std::string& model) {
   return transact([&](bool) {
+    db_->run(
+        "UPDATE study SET state = 'open', summary = '' WHERE model = $1 AND EXISTS (SELECT 1 FROM job WHERE model "
+        "= $1 AND state = 'failed')",
+        {model});
     db_->run("DELETE FROM result WHERE hash IN (SELECT hash FROM job WHERE model = $1 AND state = 'failed')", {model});
     return static_cast<int>(
         db_->run("UPDATE job SET state = 'waiting', attempt = 0, vanished = 0, worker = NULL, message = NULL WHERE "

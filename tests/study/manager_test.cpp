@@ -427,6 +427,61 @@ TEST(Study, RunsFailedOnesAgainWhenAsked) {
   EXPECT_EQ(again, r.alpha.failed);
 }
 
+TEST(Study, IsOpenOnceAnotherOneRunsItsFailedPointsAgain) {
+  const Folder folder;
+  Problem p = make_small_problem(300);
+  StudyOptions a = make_options(folder / "s"), b = a;
+  b.name = "other";
+  run(p, a);
+  p.seed = 7;
+  const StudyResult r = run(p, b);
+  ASSERT_GT(r.alpha.failed, 0);
+  Store store(folder / "s");
+  ASSERT_EQ(store.find_study("other")->state, "finished");
+  ASSERT_GT(store.rerun_failed(store.find_study("main")->model), 0);
+  EXPECT_EQ(store.find_study("other")->state, "open");
+  EXPECT_FALSE(read_study(p, store, *store.find_study("other")).is_finished);
+  EXPECT_EQ(write_bits(run(p, b)), write_bits(r));
+  EXPECT_EQ(store.find_study("other")->state, "finished");
+}
+
+TEST(Study, IsNotReadAsFinishedWithoutAllOfItsRuns) {
+  const Folder folder;
+  const Problem p = make_small_problem(300);
+  run(p, make_options(folder / "s"));
+  Store store(folder / "s");
+  const StudyRow row = *store.find_study("main");
+  ASSERT_TRUE(read_study(p, store, row).is_finished);
+  const std::string some = store.load_results(row.model).front().hash;
+  store.rerun({some});
+  const StudyResult r = read_study(p, store, row);
+  EXPECT_FALSE(r.is_finished);
+  for (const auto& output : r.alpha.outputs)
+    for (const auto& level : output.levels) EXPECT_FALSE(level.lower.converged || level.upper.converged);
+}
+
+TEST(Study, BegunElsewhereIsNotReplacedByAnotherOneOfItsName) {
+  const Folder folder;
+  const Problem p = make_small_problem(200);
+  StudyOptions o = make_options(folder / "s");
+  o.source = "house X";
+  const StudyResult r = run(p, o);
+  Store store(folder / "s");
+  const std::string was = store.find_study("main")->definition;
+  StudyOptions other = o;
+  other.source = "house Y";
+  other.is_new = true;
+  try {
+    run(p, other);
+    FAIL() << "was taken";
+  } catch (const InputError& e) { EXPECT_EQ(e.first_error().code, "E822"); }
+  EXPECT_EQ(store.find_study("main")->definition, was);
+  // the same one, from a folder of another machine
+  o.is_new = true;
+  o.source_name = "elsewhere.toml";
+  EXPECT_EQ(write_bits(run(p, o)), write_bits(r));
+}
+
 TEST(Study, KeepsPointsWithoutAFormulaAsFailed) {
   const Folder folder;
   Problem p = make_small_problem(300);
