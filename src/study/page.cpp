@@ -51,22 +51,39 @@ json runs_json(const Problem& p, const StudyResult& r, const std::vector<int>& c
   for (const Curve& c : curves) points += c.is_outline ? 0 : c.at.size();
   std::vector<float> ordinates;
   ordinates.reserve(chosen.size() * points);
-  std::vector<int> digits;  // of outputs
-  for (std::size_t k = 0; k < r.outputs.size(); ++k) {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (const int i : chosen)
-      if (const auto& values = r.alpha.archive[i].result.values; k < values.size() && std::isfinite(values[k]))
-        low = std::min(low, values[k]), high = std::max(high, values[k]);
-    digits.push_back(calc_digits(low, high, 7));
-  }
-  for (const int i : chosen) {
-    const uncertainty::Sample& s = r.alpha.archive[i];
-    json inputs = json::array(), derived = json::array(), outputs = json::array();
-    for (std::size_t k = 0; k < s.x.size(); ++k) inputs.push_back(number(s.x[k] / p.inputs[k].unit_value));
-    if (p.calc_derived) {
-      const std::vector<double> values = p.calc_derived(s.x);
-      for (std::size_t k = 0; k < values.size(); ++k) derived.push_back(number(values[k] / p.derived[k].unit_value));
+  std::vector<std::vector<double>> derived_values;
+  if (p.calc_derived)
+    for (const int i : chosen) derived_values.push_back(p.calc_derived(r.alpha.archive[i].x));
+  // seven digits of what varies
+  const auto list_digits = [&chosen](std::size_t count, const auto& values_of) {
+    std::vector<int> digits;
+    for (std::size_t k = 0; k < count; ++k) {
+      double low = std::numeric_limits<double>::infinity(), high = -low;
+      for (std::size_t n = 0; n < chosen.size(); ++n)
+        if (const std::vector<double>& values = values_of(n); k < values.size() && std::isfinite(values[k]))
+          low = std::min(low, values[k]), high = std::max(high, values[k]);
+      digits.push_back(calc_digits(low, high, 7));
     }
+    return digits;
+  };
+  const auto sample = [&](std::size_t n) -> const uncertainty::Sample& { return r.alpha.archive[chosen[n]]; };
+  const std::vector<int> digits = list_digits(
+      r.outputs.size(), [&](std::size_t n) -> const auto& { return sample(n).result.values; });
+  const std::vector<int> input_digits = list_digits(
+      p.inputs.size(), [&](std::size_t n) -> const auto& { return sample(n).x; });
+  std::vector<int> derived_digits;
+  if (p.calc_derived)
+    derived_digits = list_digits(
+        p.derived.size(), [&](std::size_t n) -> const auto& { return derived_values[n]; });
+  for (std::size_t n = 0; n < chosen.size(); ++n) {
+    const int i = chosen[n];
+    const uncertainty::Sample& s = sample(n);
+    json inputs = json::array(), derived = json::array(), outputs = json::array();
+    for (std::size_t k = 0; k < s.x.size(); ++k)
+      inputs.push_back(number(s.x[k] / p.inputs[k].unit_value, input_digits[k]));
+    if (p.calc_derived)
+      for (std::size_t k = 0; k < p.derived.size(); ++k)
+        derived.push_back(number(derived_values[n][k] / p.derived[k].unit_value, derived_digits[k]));
     for (std::size_t k = 0; k < r.outputs.size(); ++k)
       outputs.push_back(k < s.result.values.size()
                             ? number(s.result.values[k] / find_output(p, r.outputs[k]).unit_value, digits[k])

@@ -11,8 +11,8 @@ import { atLeast, atMost, formatNumber, prettify } from "./units";
 const roundDown = (value: number, decimals: number): string => (Math.floor(value * 10 ** decimals + 1e-6) / 10 ** decimals).toFixed(decimals);
 
 /// What a stability finding says beside the margin at its end, in either language: how many zones have yielded or broken,
-/// and the least margin on the way.
-function readMargin(f: Finding): { yielded: number; broken: number; least: number } {
+/// the least margin on the way, and how many times its dead load the weakest span bears.
+function readMargin(f: Finding): { yielded: number; broken: number; least: number; span: number } {
   const numberOf = (pattern: RegExp): number | undefined => {
     const found = pattern.exec(f.text)?.[1];
     return found === undefined ? undefined : Number(found.replace(",", "."));
@@ -21,6 +21,7 @@ function readMargin(f: Finding): { yielded: number; broken: number; least: numbe
     yielded: numberOf(/(\d+) (?:zones? ha(?:s|ve) yielded|Zonen? fließ(?:t|en))/) ?? 0,
     broken: numberOf(/(\d+) (?:(?:is|are) broken|(?:ist|sind) gebrochen)/) ?? 0,
     least: Math.min(f.value ?? Infinity, numberOf(/(?:the least in the pause is|Die kleinste in der Pause ist) (\d+[.,]\d+)/) ?? Infinity),
+    span: numberOf(/(?:bears (?=\d+\.\d+ times its dead load)|trägt höchstens das |höchstens das )(\d+[.,]\d+)/) ?? Infinity,
   };
 }
 
@@ -34,22 +35,24 @@ export function listConditions(run: Run): string[] {
   for (const f of run.findings.filter((g) => g.id.startsWith("clearance.") && g.status === "warning" && g.value !== null && g.value <= 0)) out.push(`Parts are over it already: ${f.title}.`);
   for (const f of run.findings.filter((g) => g.status === "not_judged" && g !== verdict)) out.push(`What the run did not show is otherwise: ${name(f)}.`);
   if (run.findings.some((f) => f.id === "mechanism.near")) out.push("Little is otherwise than planned: the verdict is near another one, as the findings say.");
-  const charges = run.events.filter((e) => e.kind === "charge").length;
+  const charges = run.events.filter((e) => e.kind === "charge" && !/does not fire|zündet nicht/.test(e.text)).length;
   if (charges === 1) out.push("The charge does not fire, or not when the plan says.");
   if (charges > 1) out.push(`One of the ${charges} charges does not fire, or not when the plan says.`);
   const standing = run.findings.filter((f) => f.id.startsWith("stability.") && f.value !== null && f.status !== "bad");
   const margins = standing.map((f) => {
-    const { yielded, broken, least } = readMargin(f);
-    const spare = 100 * (1 - 1 / least); // [%]
-    return { title: f.title, yielded, broken, spare: yielded + broken > 0 || spare < 0.1 ? 0 : spare };
+    const { yielded, broken, least, span } = readMargin(f);
+    const spare = 100 * (1 - 1 / Math.min(least, span)); // [%]
+    return { title: f.title, yielded, broken, isSpan: span < least, spare: yielded + broken > 0 || spare < 0.1 ? 0 : spare };
   });
   margins.sort((a, b) => a.spare - b.spare);
-  for (const { title, yielded, broken, spare } of margins.slice(0, 3)) {
-    if (spare > 0) out.push(`${title}: the most loaded zone resists ${roundDown(spare, spare < 1 ? 1 : 0)} % less than the plan says.`);
+  for (const { title, yielded, broken, isSpan, spare } of margins.slice(0, 3)) {
+    if (spare > 0 && isSpan) out.push(`${title}: the weakest span bears ${roundDown(spare, spare < 1 ? 1 : 0)} % less than the plan says.`);
+    else if (spare > 0) out.push(`${title}: the most loaded zone resists ${roundDown(spare, spare < 1 ? 1 : 0)} % less than the plan says.`);
     else if (broken === 1) out.push(`${title}: zones resist less than the plan says. No margin is left: 1 zone has broken already.`);
     else if (broken > 0) out.push(`${title}: zones resist less than the plan says. No margin is left: ${broken} zones have broken already.`);
     else if (yielded === 1) out.push(`${title}: zones resist less than the plan says. No margin is left: 1 zone has yielded already.`);
     else if (yielded > 0) out.push(`${title}: zones resist less than the plan says. No margin is left: ${yielded} zones have yielded already.`);
+    else if (isSpan) out.push(`${title}: spans bear less than the plan says. No margin is left.`);
     else out.push(`${title}: zones resist less than the plan says. No margin is left.`);
   }
   for (const f of run.findings.filter((g) => g.id.startsWith("vibration.") && g.status === "warning")) out.push(`${f.title}: the ground shakes more than the middle of the screening's band, which reaches the limit.`);

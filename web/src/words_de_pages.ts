@@ -219,6 +219,8 @@ export const germanOfPages: readonly (readonly [string, string])[] = [
   ["{a}: the ground shakes more than the middle of the screening's band, which reaches the limit.", "{}: Der Boden schwingt stärker als die Mitte der Abschätzung, deren Band den Grenzwert erreicht."],
   ["The charge does not fire, or not when the plan says.", "Die Ladung zündet nicht, oder nicht, wenn der Plan es sagt."],
   ["One of the {:d} charges does not fire, or not when the plan says.", "Eine der {} Ladungen zündet nicht, oder nicht, wenn der Plan es sagt."],
+  ["{a}: the weakest span bears {:g} % less than the plan says.", "{}: Das schwächste Feld trägt {} % weniger, als der Plan sagt."],
+  ["{a}: spans bear less than the plan says. No margin is left.", "{}: Felder tragen weniger, als der Plan sagt. Es bleibt keine Reserve."],
   ["{a}: the most loaded zone resists {:g} % less than the plan says.", "{}: Die am höchsten ausgenutzte Zone trägt {} % weniger, als der Plan sagt."],
   ["{a}: zones resist less than the plan says. No margin is left: {:d} zones have yielded already.", "{}: Zonen tragen weniger, als der Plan sagt. Eine Reserve ist nicht mehr da: {} Zonen fließen schon."],
   ["{a}: zones resist less than the plan says. No margin is left: 1 zone has yielded already.", "{}: Zonen tragen weniger, als der Plan sagt. Eine Reserve ist nicht mehr da: 1 Zone fließt schon."],

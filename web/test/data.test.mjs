@@ -369,6 +369,16 @@ describe("what would make it fail", () => {
     assert.deepEqual(tell(pause(1.34, sways)), ["Between A and B: the most loaded zone resists 9 % less than the plan says."]);
   });
 
+  it("takes spans for margins where they are weaker than zones", () => {
+    const start = (text) => ({ id: "stability.start", heading: "Stability", title: "Before the first charge", text, value: 1.56, unit: "1", status: "warning" });
+    const zone = "Zone B-1/end is nearest to its resistance and uses 64 % of it (margin 1.56); no zone has yielded, none is broken.";
+    const span = (times) => `${zone} With hinges at both ends and in the middle S-A1B2-0 bears ${times} times its dead load at the most`;
+    assert.deepEqual(tell(start(`${span("1.06")}.`)), ["Before the first charge: the weakest span bears 5 % less than the plan says."]);
+    assert.deepEqual(tell(start(`${span("0.98")}: as described it could not stand.`)), ["Before the first charge: spans bear less than the plan says. No margin is left."]);
+    assert.deepEqual(tell(start("Mit Gelenken an beiden Enden und in der Mitte trägt S-A1B2-0 höchstens das 1,06-Fache seiner Eigenlast.")), ["Before the first charge: the weakest span bears 5 % less than the plan says."]);
+    assert.deepEqual(tell(start(`${span("3.38")}.`)), ["Before the first charge: the most loaded zone resists 35 % less than the plan says."]);
+  });
+
   it("tells of no way that is left where a limit is broken", () => {
     assert.deepEqual(tell(clearance("Hall", 3.2, "The nearest part, C-A1-0, comes to 3.2 m at 4.10 s; the limit is 4.0 m.", "bad")), ["It fails already: Clearance, Hall."]);
     assert.deepEqual(tell({ id: "mechanism.near", heading: "Mechanism", title: "Near another verdict", text: "", value: null, unit: "", status: "warning" }), [

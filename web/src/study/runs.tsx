@@ -199,7 +199,7 @@ function Limits(props: { state: State }) {
                 <th scope="row">{a.title}</th>
                 <td><input type="checkbox" checked={shown} aria-label={`${a.title} shown`} onChange={() => toggle(a.id)} /></td>
                 {([0, 1] as const).map((k) => (
-                  <td><input type="text" inputMode="decimal" size={9} disabled={!shown} aria-label={`${a.title} ${k === 0 ? "from" : "to"}`} value={String(Number((range[k] as number).toPrecision(6)))} onChange={(e) => set(k, e.currentTarget.value)} /></td>
+                  <td><input type="text" inputMode="decimal" size={9} disabled={!shown} aria-label={`${a.title} ${k === 0 ? "from" : "to"}`} value={String(Number((range[k] as number).toPrecision(digitsWithin(range[0], range[1], 6))))} onChange={(e) => set(k, e.currentTarget.value)} /></td>
                 ))}
               </tr>
             );

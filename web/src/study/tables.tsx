@@ -1,4 +1,4 @@
-import { formatDate, formatNumber, prettify } from "../units";
+import { digitsWithin, formatDate, formatNumber, prettify } from "../units";
 import { isKnown, titleOf, type Driver, type Study } from "./data";
 import type { State } from "./state";
 import { OutcomeName } from "./verdict";
@@ -119,7 +119,7 @@ export function Boxes(props: { state: State }) {
                         {q.core !== null && <line class="core" x1={at(q.core)} x2={at(q.core)} y1={0} y2={16} />}
                       </svg>
                     </td>
-                    <td>{formatNumber(q.lower)}</td><td>{formatNumber(q.core)}</td><td>{formatNumber(q.upper)}</td>
+                    {[q.lower, q.core, q.upper].map((v) => <td>{formatNumber(v, digitsWithin(low, high))}</td>)}
                   </tr>
                 );
               })}
