@@ -82,9 +82,14 @@ record::RccState make_state(const nearfield::ZoneInput& in, const nearfield::Fib
   out.rotation = at.rotation, out.moment = at.moment;
   out.eps_0 = c.eps_0[i] + s * (c.eps_0[j] - c.eps_0[i]);
   out.curvature = c.kappa[i] + s * (c.kappa[j] - c.kappa[i]);
-  nearfield::find_equilibrium(fibres, c.N, out.curvature, out.eps_0, c.bars[i]);
+  nearfield::BarStates bars = c.bars[i];
+  if (at.rotation == c.first_torn.rotation)
+    out.eps_0 = c.torn.eps_0, out.curvature = c.torn.kappa, bars = c.bars[c.torn.after];
+  else if (at.rotation < c.first_torn.rotation && c.rotation[j] > c.first_torn.rotation)
+    out.eps_0 = c.eps_0[i];  // the chord leads to where a bar has torn
+  nearfield::find_equilibrium(fibres, c.N, out.curvature, out.eps_0, bars);
   const nearfield::SectionState state =
-      nearfield::make_section_state(in, fibres, c.axis, out.eps_0, out.curvature, c.bars[i]);
+      nearfield::make_section_state(in, fibres, c.axis, out.eps_0, out.curvature, bars);
   for (const auto& l : state.layers)
     out.layers.push_back({l.from, l.to, l.core_breadth, l.cover_breadth, l.strain, l.core_stress, l.cover_stress,
                           nearfield::name_of(l.core), nearfield::name_of(l.cover)});

@@ -129,6 +129,7 @@ Fibres make_fibres(const ZoneInput& in, Axis axis) {
       diameters.push_back(bar.diameter);
     }
     out.bar_area[row] += bars_kept * bar.area;
+    out.bar_row.push_back(row);
   }
   if (has_flange)
     for (const Flange::Bars& bars : {in.flange.top, in.flange.bottom}) {
@@ -219,7 +220,7 @@ Fibres make_fibres(const ZoneInput& in, double angle) {
   add_strips(core_layers, -inner, inner);
   if (has_core) add_strips(cover_layers, inner, outer);
 
-  out.bar_at.clear(), out.bar_area.clear(), out.bar_law.clear();
+  out.bar_at.clear(), out.bar_area.clear(), out.bar_law.clear(), out.bar_row.clear();
   for (const product::Bar& bar : in.section.bars) {
     const Point p = place(bar.y, bar.z);
     out.bar_at.push_back(p.at), out.bar_across.push_back(p.across);
@@ -303,6 +304,21 @@ struct Search {
   double N = 0, tolerance = 0;
 };
 
+/// Newton's method between two strains with equilibrium between them, bisection where it leaves or stalls.
+///   e, r  one of them and its resultants; then those of equilibrium
+void close_in(const PackedSection& f, const Search& search, double kappa, double other, double& e, Resultants& r) {
+  double low = std::min(e, other), high = std::max(e, other), residual = r.N - search.N;
+  for (int i = 0; i < 80; ++i) {
+    double next = r.dN > 0 ? e - residual / r.dN : low - 1;
+    if (!(next > low && next < high) || i % 6 == 5) next = 0.5 * (low + high);
+    e = next;
+    r = calc_resultants(f, e, kappa);
+    residual = r.N - search.N;
+    if (std::abs(residual) <= search.tolerance || high - low < 1e-13) break;
+    (residual > 0 ? high : low) = e;
+  }
+}
+
 /// The search of find_equilibrium, also giving the resultants there.
 bool find(const PackedSection& f, const Search& search, double kappa, double& eps_0, Resultants& at) {
   constexpr double largest_strain = 0.6, largest_step = 2e-3, closest_step = 5e-5;
@@ -359,18 +375,50 @@ bool find(const PackedSection& f, const Search& search, double kappa, double& ep
     }
     if (!crossed()) e = beyond, r = r_beyond, residual = r.N - search.N;
   }
-  // Newton inside the bracket, bisection where it leaves or stalls.
-  double low = std::min(e, other), high = std::max(e, other);
-  for (int i = 0; i < 80; ++i) {
-    double next = r.dN > 0 ? e - residual / r.dN : low - 1;
-    if (!(next > low && next < high) || i % 6 == 5) next = 0.5 * (low + high);
-    e = next;
-    r = calc_resultants(f, e, kappa);
-    residual = r.N - search.N;
-    if (done() || high - low < 1e-13) break;
-    (residual > 0 ? high : low) = e;
-  }
+  close_in(f, search, kappa, other, e, r);
   return accept();
+}
+
+/// The strain and the force of the hill of a compression between two strains, by golden section.
+///   force  at a compressive strain
+template <typename F>
+Peak find_top(double a, double b, const F& force) {
+  const double g = 0.6180339887498949;
+  double c = b - g * (b - a), d = a + g * (b - a), Fc = force(c), Fd = force(d);
+  for (int i = 0; i < 30; ++i) {
+    if (Fc > Fd) {
+      b = d, d = c, Fd = Fc, c = b - g * (b - a), Fc = force(c);
+    } else {
+      a = c, c = d, Fc = Fd, d = a + g * (b - a), Fd = force(d);
+    }
+  }
+  const double strain = 0.5 * (a + b);
+  return {force(strain), strain};
+}
+
+/// The first even strain that bears a compression, on the way from none. A cover that softens leaves two hills where
+/// ties make the core bear more behind it, and the search above steps from one onto the other.
+bool find_evenly(const PackedSection& f, const Search& search, double eps_c1, double& eps_0, Resultants& at) {
+  constexpr double largest_strain = 0.3;
+  double step = 0.05 * eps_c1, before = 0;
+  Resultants last = calc_resultants(f, 0, 0);
+  for (double e = -step; e > -largest_strain; e -= step) {
+    Resultants r = calc_resultants(f, e, 0);
+    double reached = e;
+    if (r.N > search.N && last.dN > 0 && r.dN <= 0) {  // over the top of a hill
+      reached = -find_top(-before, -e, [&](double strain) { return -calc_resultants(f, -strain, 0).N; }).strain;
+      r = calc_resultants(f, reached, 0);
+    }
+    if (r.N <= search.N) {
+      close_in(f, search, 0, before, reached, r);
+      eps_0 = reached, at = r;
+      return true;
+    }
+    last = reached == e ? r : calc_resultants(f, e, 0);
+    before = e;
+    if (-e > 3 * eps_c1) step *= 1.05;
+  }
+  return false;
 }
 
 }  // namespace
@@ -391,27 +439,24 @@ BarStates March::bars_at(size_t point) const {
 Peak find_crushing(const Fibres& f) {
   const PackedSection packed = pack_section(f);
   const auto force = [&](double e) { return -calc_resultants(packed, -e, 0).N; };
-  double best = 0, best_strain = 0;
-  double e = 1e-5;
+  Peak best;
   constexpr double ratio = 1.15;
-  for (; e < 0.3; e *= ratio) {
-    const double F = force(e);
-    if (F > best) best = F, best_strain = e;
+  for (double e = 1e-5; e < 0.3; e *= ratio)
+    if (const double F = force(e); F > best.force) best = {F, e};
+  if (best.strain <= 0) return {};
+  if (const Peak top = find_top(best.strain / ratio, best.strain * ratio, force); top.force > best.force) best = top;
+  const auto take = [&best](const Peak& p) {
+    if (p.force > best.force * (1 + 1e-9)) best = p;
+  };
+  // the sharp hill of the cover or of the bars may lie between two strains of the grid
+  std::vector<double> bends{f.cover.eps_c1, f.core.eps_c1};
+  for (const material::Steel& law : f.bar_law) bends.push_back(law.eps_y);
+  for (const double bend : bends) {
+    if (!(bend > 0)) continue;
+    take({force(bend), bend});
+    take(find_top(bend / ratio, bend * ratio, force));
   }
-  if (best_strain <= 0) return {};
-  // Golden section around the best of the grid.
-  const double g = 0.6180339887498949;
-  double a = best_strain / ratio, b = best_strain * ratio;
-  double c = b - g * (b - a), d = a + g * (b - a), Fc = force(c), Fd = force(d);
-  for (int i = 0; i < 30; ++i) {
-    if (Fc > Fd) {
-      b = d, d = c, Fd = Fc, c = b - g * (b - a), Fc = force(c);
-    } else {
-      a = c, c = d, Fc = Fd, d = a + g * (b - a), Fd = force(d);
-    }
-  }
-  const double strain = 0.5 * (a + b), F = force(strain);
-  return F > best ? Peak{F, strain} : Peak{best, best_strain};
+  return best;
 }
 
 March march_curvature(const Fibres& f, double N, int direction, const std::vector<double>& kappa) {
@@ -421,7 +466,18 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
   PackedSection packed = pack_section(f);
   double eps_0 = 0;
   Resultants r;
-  if (!find(packed, search, 0, eps_0, r)) return out;
+  const bool is_found = find(packed, search, 0, eps_0, r);
+  // not found, or not before the first hill that there may be
+  if (N < 0 && has_concrete(f) && !(is_found && eps_0 > -0.9 * std::min(f.cover.eps_c1, f.core.eps_c1))) {
+    double first = 0;
+    Resultants there;
+    if (find_evenly(packed, search, f.cover.eps_c1, first, there) && (!is_found || first > eps_0 + 1e-9))
+      eps_0 = first, r = there;
+    else if (!is_found)
+      return out;
+  } else if (!is_found) {
+    return out;
+  }
 
   // An unsymmetric section bends under N alone: start where M = 0, or at no curvature if it carries N with a moment
   // only.

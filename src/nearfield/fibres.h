@@ -14,6 +14,7 @@ struct Fibres {
   std::vector<double> at, core_area, cover_area;  // layers [m], [m²] (L)
   std::vector<double> bar_at, bar_area;           // rows of equal place and diameter (R)
   std::vector<material::Steel> bar_law;           // (R)
+  std::vector<size_t> bar_row;                    // of each bar of the section; empty for a section at an angle
   material::Concrete core, cover;
   double half_depth = 0;  // [m]
   // Places along the axis of bending, of a section at an angle only: of the layers' core and cover [m] (L), bars [m]

@@ -63,6 +63,7 @@ MomentCurve make_moment_curve(const Fibres& fibres, Axis axis, double N, int dir
     return out;
   }
   out.is_balanced = march.is_balanced;
+  const BarStates none;
   const size_t held = static_cast<size_t>(march.last) + 1;
   for (size_t j = 0; j < held; ++j) {
     out.rotation.push_back(rotation[j]);
@@ -71,6 +72,8 @@ MomentCurve make_moment_curve(const Fibres& fibres, Axis axis, double N, int dir
     out.kappa.push_back(march.origin + side * kappa[j]);
     out.bars.push_back(march.bars_at(j));
   }
+  if (!out.is_balanced)
+    out.moment.front() = std::max(0.0, side * calc_resultants(fibres, march.eps_0.front(), march.origin, none).M);
   out.yield_rotation = march.yield_kappa * length;
   out.yield_moment = march.yield_moment;
   out.loses_force = held < rotation.size();
@@ -112,6 +115,7 @@ MomentCurve make_moment_curve(const Fibres& fibres, Axis axis, double N, int dir
     // the last equilibrium with all bars
     double low = out.rotation[j - 1], high = out.rotation[j], eps_0 = out.eps_0[j - 1];
     out.first_torn.moment = out.moment[j - 1];
+    out.torn = {eps_0, out.kappa[j - 1], j - 1};
     const double origin = out.kappa[j - 1] - side * low / length;
     while (high - low > 1e-4 * high) {
       const double middle = 0.5 * (low + high), k = origin + side * middle / length;
@@ -123,6 +127,7 @@ MomentCurve make_moment_curve(const Fibres& fibres, Axis axis, double N, int dir
       }
       low = middle, eps_0 = e;
       out.first_torn = {low, std::max(0.0, side * calc_resultants(fibres, e, k, bars).M)};
+      out.torn = {e, k, j - 1};
     }
     break;
   }
@@ -245,13 +250,12 @@ SectionState make_section_state(const ZoneInput& in, const Fibres& fibres, Axis 
     layer.cover = judge(fibres.cover, layer.strain, layer.cover_stress);
     out.layers.push_back(layer);
   }
-  for (const product::Bar& bar : s.bars) {
+  for (size_t i = 0; i < s.bars.size(); ++i) {
+    const product::Bar& bar = s.bars[i];
     SectionState::BarState b;
     b.y = bar.y, b.z = bar.z, b.diameter = bar.diameter;
-    const double at = axis == Axis::Y ? bar.z : bar.y;
-    size_t row = 0;
-    while (row + 1 < fibres.bar_at.size() && std::abs(fibres.bar_at[row] - at) >= 1e-9) ++row;
-    b.strain = eps_0 + kappa * at;
+    const size_t row = fibres.bar_row[i];
+    b.strain = eps_0 + kappa * fibres.bar_at[row];
     const material::SteelState state = bars.empty() ? material::SteelState{} : bars[row];
     b.stress = material::calc_response(fibres.bar_law[row], state, b.strain).stress;
     b.condition = judge(fibres.bar_law[row], state, b.strain);

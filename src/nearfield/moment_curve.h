@@ -32,6 +32,10 @@ struct MomentCurve {
   bool loses_force = false;                     // beyond `carried_to` N cannot be carried
   double carried_to = 0;  // last rotation at which N is carried; beyond the last point if no moment was left [rad]
   CurvePoint first_torn{std::numeric_limits<double>::infinity(), 0};  // last equilibrium before the first bar tears
+  struct {
+    double eps_0 = 0, kappa = 0;
+    size_t after = 0;  // point of the curve, for the histories
+  } torn;              // the section there
 };
 
 /// The march of make_rcc with the rotations given, its loss of N sought to 1e-3 of the rotation.

@@ -204,6 +204,9 @@ Section read_section(Reading& reading, const Entry& entry) {
   read_bars(table, s);
   if (const auto area = table.find_quantity("steel_area", Dimension::Area, {0.1 * unit::cm2, 1})) {
     // the measured steel area in bars of the drawn places: every bar grows or shrinks alike
+    if (s.bars.empty())
+      table.error("E207", table.place_of("steel_area"), "steel_area: there are no bars to hold it",
+                  "give bars at their places, as drawn; the area says what they have in all");
     const double ratio = *area / s.steel_area();
     for (Bar& bar : s.bars) bar.area *= ratio, bar.diameter *= std::sqrt(ratio);
   }

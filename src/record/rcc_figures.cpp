@@ -171,7 +171,7 @@ void add_interaction(const RccReport& r, char axis, std::vector<Figure>& out) {
   Figure f;
   f.table.heads.push_back("N [MN]");
   size_t rows = 0;
-  bool is_one_sided = false;
+  bool is_one_sided = false, lacks_yield = false;
   for (size_t k = 0; k < routes.size(); ++k) {
     PlotLine yield, peak;
     for (const RccInteraction& i : r.interactions) {
@@ -185,7 +185,8 @@ void add_interaction(const RccReport& r, char axis, std::vector<Figure>& out) {
       std::vector<double> N, My, Mp;
       for (size_t j = 0; j < i.normal_force.size(); ++j) {
         N.push_back(i.normal_force[j] / unit::MN);
-        is_one_sided = is_one_sided || !std::isfinite(i.yield_moment[j]);
+        lacks_yield = lacks_yield || !std::isfinite(i.yield_moment[j]);
+        is_one_sided = is_one_sided || i.peak_moment[j] < -1e-6 * r.crushing_force;
         My.push_back(i.direction * i.yield_moment[j] / unit::kNm);
         Mp.push_back(i.direction * i.peak_moment[j] / unit::kNm);
         std::vector<std::string>& row = f.table.rows[j];
@@ -225,6 +226,8 @@ void add_interaction(const RccReport& r, char axis, std::vector<Figure>& out) {
     f.caption +=
         " Near both ends, where the dashed line is missing, the section is not symmetric enough to carry N without a "
         "moment: it needs one between both sides of the full line.";
+  else if (lacks_yield)
+    f.caption += " Where the dashed line is missing, N alone makes the bars yield.";
   f.drawing = draw(p);
   out.push_back(std::move(f));
 }

@@ -136,6 +136,26 @@ const char* const beam =
     "ties = { diameter = \"8 mm\", spacing = \"15 cm\" }\ntop = \"2 x 12 mm\"\nbottom = \"4 x 25 mm\"\n"
     "[zone]\nlength = \"30 cm\"\n";
 
+TEST(RccCommand, SectionsAtThePeakHaveAllTheirBars) {
+  // the moment rises until a bar tears
+  const OwnFolder own;
+  replace_file(own / "beam.toml", beam);
+  const fs::path folder = run("all_bars", "--normal-force \"-0.2 MN\"", own / "beam.toml");
+  const auto j = nlohmann::json::parse(read_file((folder / "rcc.json").string()));
+  int peaks = 0;
+  for (const auto& s : j["states"]) {
+    if (s["point"] != "peak") continue;
+    ++peaks;
+    double pulled = 0;
+    for (const auto& bar : s["bars"]) {
+      EXPECT_NE(bar["condition"], "torn") << s["axis"] << s["direction"];
+      pulled = std::max(pulled, bar["stress"].get<double>());
+    }
+    EXPECT_GT(pulled, 500e6) << s["axis"] << s["direction"];
+  }
+  EXPECT_GE(peaks, 4);
+}
+
 TEST(RccCommand, ForcesCarriedToOneSideHaveNoYield) {
   const OwnFolder own;
   replace_file(own / "beam.toml", beam);

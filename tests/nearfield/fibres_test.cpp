@@ -187,6 +187,54 @@ Fibres halve_layers(const Fibres& f) {
   return out;
 }
 
+/// A square column whose ties make its core bear about as much as all of it did before the cover came off.
+///   tie, bar  diameters
+ZoneInput make_tied(double side, double fc, double Ec, double eps_c1, double Gcl, double fy, double cover, int bars,
+                    double bar) {
+  ZoneInput in;
+  product::Section& s = in.section;
+  s.name = "tied", s.width = s.height = side, s.cover = cover;
+  s.tie_diameter = 12 * mm, s.tie_spacing = 80 * mm, s.tie_legs_y = s.tie_legs_z = 4;
+  const double edge = 0.5 * side - cover - 12 * mm - 0.5 * bar;
+  for (int i = 0; i < bars; ++i)
+    for (int j = 0; j < bars; ++j)
+      if (i == 0 || j == 0 || i == bars - 1 || j == bars - 1)
+        s.bars.push_back({edge * (2.0 * i / (bars - 1) - 1), edge * (2.0 * j / (bars - 1) - 1),
+                          0.25 * 3.14159265358979 * bar * bar, bar});
+  in.concrete.fc = fc, in.concrete.Ec = Ec, in.concrete.eps_c1 = eps_c1;
+  in.concrete.fct = 4 * MPa, in.concrete.Gf = 150, in.concrete.Gcl = Gcl;
+  in.steel = {"", fy, 1.1 * fy, 200e3 * MPa, 0.05};
+  in.length = 0.3;
+  return in;
+}
+
+TEST(FibresPhysics, TheFirstStrainThatBearsAForceIsFound) {
+  const Fibres f =
+      make_fibres(make_tied(400 * mm, 90 * MPa, 44e3 * MPa, 2.8e-3, 40e3, 500 * MPa, 30 * mm, 4, 20 * mm), Axis::Y);
+  const double crushing = find_crushing(f).force;
+  for (const double share : {0.5, 0.8, 0.86, 0.9, 0.95, 0.99, 0.995}) {
+    const double N = -share * crushing;
+    double first = 0;
+    while (calc_resultants(f, -first, 0).N > N) first += 1e-6;
+    for (const int direction : {1, -1}) {
+      const March march = march_curvature(f, N, direction, {0, 1e-5, 1e-4});
+      ASSERT_GE(march.last, 2) << share;
+      EXPECT_NEAR(march.eps_0[0], -first, 2e-6) << share;
+      EXPECT_GT(march.moment[2], 0) << share;
+    }
+  }
+}
+
+TEST(FibresPhysics, CrushingIsTheLargestForceOfAnyStrain) {
+  for (const double fc : {40.0, 50.0, 53.4266248562, 60.0}) {
+    const Fibres f =
+        make_fibres(make_tied(500 * mm, fc * MPa, 37.6e3 * MPa, 2.2e-3, 15e3, 420 * MPa, 15 * mm, 3, 16 * mm), Axis::Y);
+    double most = 0;
+    for (double e = 0; e < 0.05; e += 2e-6) most = std::max(most, -calc_resultants(f, -e, 0).N);
+    EXPECT_NEAR(find_crushing(f).force, most, 1e-6 * most) << fc;
+  }
+}
+
 TEST(FibresPhysics, PeakAndEnergyDoNotDependOnTheLayers) {
   ZoneInput in = make_warner(4);
   for (int i = 0; i < 4; ++i) {

@@ -219,6 +219,35 @@ TEST(SectionState, ItsStressesIntegrateToTheResultants) {
   EXPECT_NEAR(M, c.moment[j], 1e-6 * c.moment[j]);
 }
 
+TEST(SectionState, HasEachBarAsItsOwnDiameterIs) {
+  // a thin and a thick bar side by side: the thin one buckles
+  ZoneInput in = make_zone();
+  in.section.bars = {
+      {0, -0.2, 50e-6, 8e-3}, {0.05, -0.2, 616e-6, 28e-3}, {0, 0.2, 50e-6, 8e-3}, {0.05, 0.2, 616e-6, 28e-3}};
+  const Fibres f = make_fibres(in, Axis::Y);
+  const SectionState s = make_section_state(in, f, Axis::Y, -6e-3, 0);
+  for (size_t i = 0; i < s.bars.size(); ++i)
+    EXPECT_EQ(s.bars[i].stress,
+              material::calc_response(make_bar(in, in.section.bars[i].diameter), material::SteelState{}, -6e-3).stress)
+        << i;
+  EXPECT_NE(s.bars[0].stress, s.bars[1].stress);
+}
+
+TEST(MomentCurve, HasTheSectionBeforeTheFirstBarTears) {
+  const ZoneInput in = make_zone();
+  const Rcc rcc = make_rcc(in);
+  const Fibres f = make_fibres(in, Axis::Y);
+  for (const double N : {0.0, 0.5e6, 1e6}) {
+    const MomentCurve c = make_moment_curve(f, Axis::Y, N, 1, in.length, refine_rotations(rcc.y_pos, 4));
+    ASSERT_TRUE(std::isfinite(c.first_torn.rotation)) << N;
+    const Resultants r = calc_resultants(f, c.torn.eps_0, c.torn.kappa, c.bars[c.torn.after]);
+    EXPECT_NEAR(r.M, c.first_torn.moment, 1e-9 * c.first_torn.moment) << N;
+    EXPECT_NEAR(r.N, N, 1e-4 * 10e6) << N;
+    for (const auto& b : make_section_state(in, f, Axis::Y, c.torn.eps_0, c.torn.kappa, c.bars[c.torn.after]).bars)
+      EXPECT_NE(b.condition, BarCondition::Torn) << N;
+  }
+}
+
 TEST(SectionState, NamesWhatHappensAtTheEdges) {
   const ZoneInput in = make_zone();
   const Rcc rcc = make_rcc(in);
