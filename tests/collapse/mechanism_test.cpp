@@ -80,7 +80,7 @@ TEST(Mechanism, WhatIsInPiecesIsJudgedByAllOfThem) {
 TEST(Mechanism, ABlockThatHoldsTogetherByLittleIsNearWhatAllOfItDoes) {
   // its largest part has 52 %, and a bound of 55 % would have all of it judged, which leans alike
   MechanismInput in = synthetic(0.2, 0, 1);
-  for (BlockFrame& f : in.frames) take_apart(f, 0.52);
+  for (BlockFrame& f : in.frames) take_apart(f, 0.52), f.moved = 1;
   EXPECT_EQ(name_of(in), "topple");
   for (const NearVerdict& near : find_near_verdicts(in, default_knowledge()))
     EXPECT_NE(near.rule, "mechanism.coherent_share") << near.as.name;

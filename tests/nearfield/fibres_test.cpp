@@ -226,12 +226,14 @@ TEST(FibresPhysics, TheFirstStrainThatBearsAForceIsFound) {
 }
 
 TEST(FibresPhysics, CrushingIsTheLargestForceOfAnyStrain) {
-  for (const double fc : {40.0, 50.0, 53.4266248562, 60.0}) {
+  for (const double fc : {40.0, 45.0, 50.0, 53.4266248562}) {
     const Fibres f =
         make_fibres(make_tied(500 * mm, fc * MPa, 37.6e3 * MPa, 2.2e-3, 15e3, 420 * MPa, 15 * mm, 3, 16 * mm), Axis::Y);
     double most = 0;
     for (double e = 0; e < 0.05; e += 2e-6) most = std::max(most, -calc_resultants(f, -e, 0).N);
-    EXPECT_NEAR(find_crushing(f).force, most, 1e-6 * most) << fc;
+    // the scan steps over the tip of the hill
+    EXPECT_GE(find_crushing(f).force, most * (1 - 1e-9)) << fc;
+    EXPECT_LE(find_crushing(f).force, most * (1 + 1e-4)) << fc;
   }
 }
 

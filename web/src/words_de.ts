@@ -459,6 +459,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["{n}: is not possible beside heights", "{}: ist neben heights nicht möglich"],
   ["{n}: belongs to masonry; the concrete has its own", "{}: gehört zu Mauerwerk; der Beton hat eigene Werte"],
   ["the bars take more than 15 % of the section", "die Stäbe nehmen mehr als 15 % des Querschnitts ein"],
+  ["steel_area: there are no bars to hold it", "steel_area: Es gibt keine Stäbe, die sie haben könnten"],
   ["cover: leaves no room for the reinforcement in this thickness", "cover: lässt in dieser Dicke keinen Platz für die Bewehrung"],
   ["cover: leaves no room for bars between the ties of this section", "cover: lässt zwischen den Bügeln dieses Querschnitts keinen Platz für Stäbe"],
   ["cover: leaves no room for the bars in this thickness", "cover: lässt in dieser Dicke keinen Platz für die Stäbe"],
