@@ -58,13 +58,24 @@ int clip(const Vec3* in, int count, const Vec3& n, double offset, Vec3* out) {
   return kept;
 }
 
-/// The face that looks most along n (in W).
+/// Of the faces with most of the outermost corners along n (in W), both of an edge that lies across it, the one that
+/// looks most along n: another face may look more along it and lie further in.
 const Hull::Face& find_face(const Solid& s, const Vec3& n) {
   const Vec3 local = transpose_times(s.R, n);
-  const auto& faces = s.hull->faces;
-  return *std::max_element(faces.begin(), faces.end(), [&](const Hull::Face& x, const Hull::Face& y) {
-    return dot(x.normal, local) < dot(y.normal, local);
-  });
+  const Hull& h = *s.hull;
+  double outermost = -std::numeric_limits<double>::infinity();
+  for (const Vec3& v : h.vertices) outermost = std::max(outermost, dot(v, local));
+  outermost -= 1e-9 * h.reach;
+  const Hull::Face* best = nullptr;
+  int most = 0;
+  for (const Hull::Face& f : h.faces) {
+    int corners = 0;
+    for (const int i : f.loop) corners += dot(h.vertices[static_cast<size_t>(i)], local) >= outermost ? 1 : 0;
+    const bool is_better =
+        best == nullptr || corners > most || (corners == most && dot(f.normal, local) > dot(best->normal, local));
+    if (is_better) best = &f, most = corners;
+  }
+  return *best;
 }
 
 /// The corners of the area, seen along n, in which the faces of both solids that look at each other overlap; those with
@@ -144,18 +155,23 @@ void hull_hull(const Solid& a, const Solid& b, int& remembered, BoxContact& out)
   };
   if (remembered >= 0 && static_cast<size_t>(remembered) < axes && is_apart(look(static_cast<size_t>(remembered))))
     return;
-  Axis best{{}, std::numeric_limits<double>::infinity(), -1};
+  Axis best{{}, std::numeric_limits<double>::infinity(), -1}, least = best;
   for (size_t i = 0; i < axes; ++i) {
     const Axis axis = look(i);
     if (is_apart(axis)) return;
     // faces are preferred to edges, and those of the first, unless clearly deeper: the choice stays steady
     const double preference = i < faces_a ? 1.0 : i < faces_a + faces_b ? 0.98 : 0.95;
     if (axis.overlap < preference * best.overlap - (i < faces_a ? 0 : 1e-9)) best = axis;
+    if (axis.overlap < least.overlap) least = axis;
   }
   if (best.number < 0) return;
   out.normal = best.n;
   // edges that cross are corners of the overlap of the faces beside them
   overlap_points(a, b, best.n, out);
+  if (out.count > 0 || least.number == best.number) return;
+  // along an axis that is not the least one the outermost corner may lie beside the face
+  out.normal = least.n;
+  overlap_points(a, b, least.n, out);
 }
 
 void sphere_hull(const Solid& sphere, const Solid& solid, bool flipped, BoxContact& out) {
@@ -239,8 +255,26 @@ void plane_solid(const Solid& plane, const Solid& other, bool flipped, BoxContac
                                     i & 4 ? other.half.z : -other.half.z},
            1);
   } else {
-    for (size_t i = 0; i < other.hull->vertices.size(); ++i)
-      take(other.p + other.R * other.hull->vertices[i], other.hull->weights[i]);
+    const Hull& hull = *other.hull;
+    const auto place = [&](size_t i) { return other.p + other.R * hull.vertices[i]; };
+    size_t below = 0;
+    double weight = 0;
+    for (size_t i = 0; i < hull.vertices.size(); ++i)
+      if (dot(n, place(i) - plane.p) < 0) ++below, weight += hull.weights[i];
+    if (below <= static_cast<size_t>(kMostPoints)) {
+      for (size_t i = 0; i < hull.vertices.size(); ++i) take(place(i), hull.weights[i]);
+    } else {
+      // spread over all of them, with the weight of those left out
+      size_t seen = 0;
+      double taken = 0;
+      for (size_t i = 0; i < hull.vertices.size(); ++i) {
+        const Vec3 p = place(i);
+        if (!(dot(n, p - plane.p) < 0)) continue;
+        const size_t before = seen * kMostPoints / below, after = ++seen * kMostPoints / below;
+        if (after > before) take(p, hull.weights[i]), taken += hull.weights[i];
+      }
+      for (int i = 0; i < out.count; ++i) out.weight[i] *= weight / taken;
+    }
   }
   out.gap = std::max(0.0, lowest);
 }

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "mbs/contact_law.h"
+#include "mbs/polyhedra.h"
 #include "models.h"
 
 namespace topple::mbs {
@@ -160,6 +162,102 @@ TEST(HullPhysics, StandsOnAFaceOfManyCornersAsABoxOnFour) {
     (void)run(m, o);
     EXPECT_NEAR(z, 0.3 - 9.81 / (4 * mean * 1500 * 1500), 1e-9) << variant;
   }
+}
+
+TEST(HullPhysics, WhatOverlapsTouches) {
+  // irregular bodies, pushed together until some axis says that they overlap by a millimetre: all have points
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  const auto direction = [&] {
+    const Vec3 d{normal(random), normal(random), normal(random)};
+    return (1 / norm(d)) * d;
+  };
+  int pairs = 0;
+  for (const int corners : {4, 6, 8, 12, 20})
+    for (int pair = 0; pair < 60; ++pair) {
+      Shape shape[2];
+      for (Shape& s : shape) {
+        s = make_shape(Shape::Kind::Hull);
+        for (int i = 0; i < corners; ++i) {
+          const Vec3 d = direction();
+          s.vertices.push_back({0.3 * d.x, 0.25 * d.y, 0.2 * d.z});
+        }
+      }
+      const Hull hulls[2] = {make_hull(shape[0].vertices), make_hull(shape[1].vertices)};
+      const Vec3 way = direction();
+      const Mat3 R_a = to_matrix(exp_rotation(normal(random) * direction())),
+                 R_b = to_matrix(exp_rotation(normal(random) * direction()));
+      const auto find_points = [&](double apart, double& gap) {
+        Solid a, b;
+        a.kind = b.kind = Shape::Kind::Hull;
+        a.R = R_a, b.R = R_b, b.p = apart * way;
+        a.hull = &hulls[0], b.hull = &hulls[1];
+        int remembered = -1;
+        BoxContact out;
+        hull_hull(a, b, remembered, out);
+        gap = out.gap;
+        return out.count;
+      };
+      double near = 0, far = 1, gap = 0;
+      while (far - near > 1e-6) {
+        const double middle = 0.5 * (near + far);
+        find_points(middle, gap);
+        (gap > 0 ? far : near) = middle;
+      }
+      const int count = find_points(near - 1e-3, gap);
+      if (gap > 0) continue;  // the bodies do not hold their origins
+      ++pairs;
+      EXPECT_GT(count, 0) << corners << " " << pair;
+    }
+  EXPECT_GT(pairs, 250);
+}
+
+TEST(HullPhysics, AColumnOfStonesRoundedToMillimetresStands) {
+  // boxes of 0.4 m whose corners are off by up to half a millimetre
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> off(-5e-4, 5e-4);
+  Model m;
+  for (int i = 0; i < 3; ++i) {
+    Body b = test::make_box("stone " + std::to_string(i), 100, {0.2, 0.2, 0.2}, {0, 0, 0.2 + 0.4015 * i});
+    Shape s = make_hull_box({0.2, 0.2, 0.2});
+    for (Vec3& v : s.vertices) v += {off(random), off(random), off(random)};
+    b.shapes = {s};
+    add_body(m, b);
+  }
+  Options o = options_for(3);
+  Vec3 top;
+  o.on_frame = [&](const View& view) { top = view.X_WB[2].p; };
+  const Summary s = run(m, o);
+  EXPECT_NEAR(top.z, 1.0, 4e-3);
+  EXPECT_LT(std::hypot(top.x, top.y), 4e-3);
+  EXPECT_LT(s.energy_error, 1e-2);
+}
+
+TEST(PlanePhysics, ADrumOfManyCornersStandsOnAllOfThem) {
+  // an upright drum of 64 corners that spins about its axis on a plane shape: friction turns it about that axis alone
+  Model m;
+  m.contact.ground = false;
+  m.contact.body_friction = 0.4;
+  Body plane;
+  plane.name = "floor";
+  plane.fixed = true;
+  plane.shapes = {make_shape(Shape::Kind::Plane)};
+  add_body(m, plane);
+  Body drum = test::make_box("drum", 100, {0.2, 0.2, 0.1}, {0, 0, 0.1});
+  Shape s = make_shape(Shape::Kind::Hull);
+  for (int i = 0; i < 64; ++i)
+    for (const double z : {-0.1, 0.1})
+      s.vertices.push_back({0.2 * std::cos(2 * kPi * i / 64), 0.2 * std::sin(2 * kPi * i / 64), z});
+  drum.shapes = {s};
+  drum.w_WB = {0, 0, 5};
+  add_body(m, drum);
+  Options o = options_for(0.3);
+  Vec3 w, v;
+  o.on_frame = [&](const View& view) { w = view.w_WB[1], v = view.v_WB[1]; };
+  run(m, o);
+  EXPECT_LT(w.z, 5);
+  EXPECT_LT(std::hypot(w.x, w.y), 1e-6);
+  EXPECT_LT(norm(v), 1e-6);
 }
 
 }  // namespace
