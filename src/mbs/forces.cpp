@@ -346,6 +346,10 @@ std::vector<StiffRow> System::calc_spring_stiffness(bool fast, double force_scal
     const double chord = find_chord(c, force_scale);
     return tangent > 1e-3 * chord ? tangent : chord;
   };
+  // what will pull under the load and does not yet would leave its bodies to swing about it: with what the load gives
+  const auto pull_of = [&](double pull, double stiff) {
+    return !fast && pull == 0 && stiff > 0 ? force_scale : pull;
+  };
   // what is tight also holds its points sideways
   const auto add_between = [&](int a, int b, const Vec3& p_A, const Vec3& p_B, double stiff, double across) {
     const Vec3 d = p_B - p_A;
@@ -370,7 +374,9 @@ std::vector<StiffRow> System::calc_spring_stiffness(bool fast, double force_scal
     const double length = measure_spring(k, row), x = length - k.free_length;
     const double stiff = stiffness_of(k.spring, x, std::max(k.tension_strength, k.compression_strength), k.a, k.b, row);
     // one of no length is the same in all directions
-    const double across = length > 0 ? calc_force(k.spring, x) / length : k.free_length == 0 ? stiff : 0;
+    const double across = length > 0           ? pull_of(calc_force(k.spring, x), stiff) / length
+                          : k.free_length == 0 ? stiff
+                                               : 0;
     add_between(k.a, k.b, calc_point(k.a, k.p_A), calc_point(k.b, k.p_B), stiff, across);
   }
   for (size_t i = 0; i < model.cables.size(); ++i) {
@@ -378,7 +384,8 @@ std::vector<StiffRow> System::calc_spring_stiffness(bool fast, double force_scal
     const Cable& k = model.cables[i];
     const Vec3 p_A = calc_point(k.a.index, k.p_A), p_B = calc_point(k.b.index, k.p_B);
     const double length = norm(p_B - p_A);
-    const double across = length > 0 ? k.stiffness * (length - state.cable[i].rest_length) / length : 0;
+    const double across =
+        length > 0 ? pull_of(k.stiffness * (length - state.cable[i].rest_length), k.stiffness) / length : 0;
     add_between(k.a.index, k.b.index, p_A, p_B, k.stiffness, across);
   }
   for (size_t i = 0; i < forces.torsions.size(); ++i) {
