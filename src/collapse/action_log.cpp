@@ -12,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 #include <stdexcept>
+#include <utility>
 
 #include "base/error.h"
 #include "base/file.h"
@@ -88,7 +89,10 @@ bool is_held(const std::string& path) {
   return held;
 }
 
-int open_new(std::string& path) {
+/// The path, or with the first number behind it under which `take` finds no file.
+///   take  whether it could; errno tells why not
+template <class F>
+std::string take_free_name(const std::string& path, const F& take) {
   const std::filesystem::path wanted(path);
   for (int n = 1; n < 100000; ++n) {
     const std::string name =
@@ -96,15 +100,20 @@ int open_new(std::string& path) {
             ? path
             : (wanted.parent_path() / (wanted.stem().string() + "-" + std::to_string(n) + wanted.extension().string()))
                   .string();
-    const int file = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
-    if (file >= 0) {
-      path = name;
-      (void)flock(file, LOCK_EX | LOCK_NB);  // for as long as the session lives
-      return file;
-    }
+    if (take(name)) return name;
     if (errno != EEXIST) break;
   }
   throw std::runtime_error(path + ": the action log cannot be written: " + std::strerror(errno));
+}
+
+int open_new(std::string& path) {
+  int file = -1;
+  path = take_free_name(path, [&file](const std::string& name) {
+    file = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
+    return file >= 0;
+  });
+  (void)flock(file, LOCK_EX | LOCK_NB);  // for as long as the session lives
+  return file;
 }
 
 }  // namespace
@@ -134,6 +143,17 @@ LoggedSteering::LoggedSteering(const product::Plan& plan, const Knowledge& k, St
 
 LoggedSteering::~LoggedSteering() {
   if (file_ >= 0) close(file_);
+  std::error_code ignored;
+  if (!is_kept_ && !path_.empty()) std::filesystem::remove(path_, ignored);
+}
+
+void LoggedSteering::keep_as(const std::string& path) {
+  is_kept_ = true;
+  if (file_ < 0) return;
+  const std::string own = std::exchange(
+      path_, take_free_name(path, [&](const std::string& name) { return link(path_.c_str(), name.c_str()) == 0; }));
+  std::error_code ignored;
+  std::filesystem::remove(own, ignored);
 }
 
 void LoggedSteering::reserve(const Json& command) const {
@@ -312,8 +332,11 @@ ReplayResult replay(const std::string& log, const std::string& name, const Knowl
         options.run.frame_rate = entry.at("frame_rate");
         options.run.duration = entry.at("duration");
         options.run.step = entry.at("step");
-        result.steering = std::make_unique<LoggedSteering>(read_quietly(plan_text, entry.at("plan_path")), k, options,
-                                                           callbacks, path, sample_plan);
+        // its own log is there once it has come as far: half of it would be taken for the last session
+        result.steering =
+            std::make_unique<LoggedSteering>(read_quietly(plan_text, entry.at("plan_path")), k, options, callbacks,
+                                             path.empty() ? path : path + ".part", sample_plan);
+        result.steering->hold_back();
         continue;
       }
       Steering& s = result.steering->steering();
@@ -356,6 +379,7 @@ ReplayResult replay(const std::string& log, const std::string& name, const Knowl
     line = 1;
     fail("E942", "there is no whole line in the log");
   }
+  result.steering->keep_as(path);
   return result;
 }
 

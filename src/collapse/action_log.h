@@ -40,6 +40,10 @@ class LoggedSteering {
 
   /// Writes how far the active branch has been computed, if that is news.
   void note_reached();
+  /// The file is removed in the end unless it is kept: then it gets this name, or the next one that is free. Throws
+  /// std::runtime_error.
+  void hold_back() { is_kept_ = false; }
+  void keep_as(const std::string& path);
 
   const std::vector<std::string>& lines() const { return lines_; }  // of the log, without line ends
   const std::string& path() const { return path_; }
@@ -56,6 +60,7 @@ class LoggedSteering {
   SamplePlan sample_plan_;
   std::string path_;
   int file_ = -1;
+  bool is_kept_ = true;
   bool is_broken_ = false;  // an action was done and could not be written
   long seq_ = 0;
   std::vector<std::string> lines_;

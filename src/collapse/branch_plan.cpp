@@ -74,16 +74,9 @@ void add_changes(const product::PlanChanges& more, product::PlanChanges& changes
   changes.cables.insert(changes.cables.end(), more.cables.begin(), more.cables.end());
 }
 
-/// Cables of the plan before those that edits added.
-size_t count_own_cables(const LiveModel& live) {
-  size_t count = live.plan().cables.size();
-  for (const LiveModel::Applied& a : live.applied()) count -= a.edit.kind == Kind::AddCable;
-  return count;
-}
-
 /// Whether a cable of the branch was added and let go before the first step.
 bool added_and_let_go(const LiveModel& live, const std::string& name) {
-  size_t cable = count_own_cables(live);
+  size_t cable = live.count_own_cables();
   bool is_added = false, is_let_go = false;
   for (const LiveModel::Applied& a : live.applied()) {
     if (a.edit.kind == Kind::AddCable) is_added |= live.plan().cables[cable++].name == name && a.time <= 0;
@@ -103,7 +96,7 @@ BranchPlan write_branch_plan(const LiveModel& live) {
   };
   std::vector<Change> sayable;
   std::optional<std::vector<product::Stage>> stages;  // with all edits of charges
-  size_t cable = count_own_cables(live);
+  size_t cable = live.count_own_cables();
   for (const LiveModel::Applied& a : live.applied()) {
     const bool is_early = a.time <= 0;
     const char* later = "acts from a moment of the run on, which a plan cannot say";

@@ -165,7 +165,7 @@ std::string LiveModel::apply(const Edit& e, double time, double next) {
       text = add_cable(e);
       break;
     case Edit::Kind::RemoveCable:
-      text = remove_cable(e, next);
+      text = remove_cable(e, time, next);
       break;
     case Edit::Kind::SetFriction:
       text = set_friction(e);
@@ -224,6 +224,9 @@ std::string LiveModel::set_delay(const Edit& e, double time) {
     c.time = t;
     c.offset = e.time ? 0 : t - stage.time - *e.delay;
     charge.delay = e.time ? t - stage.time : *e.delay;
+    if (c.fails)
+      return fmt::format("{} does not fire, as the plan says; it would at {} instead of {}", member_of(c),
+                         words_of_time(t), words_of_time(before));
     return fmt::format("{} fires at {} instead of {}", member_of(c), words_of_time(t), words_of_time(before));
   }
   if (e.stage >= static_cast<int>(plan_.stages.size()))
@@ -386,16 +389,28 @@ std::string LiveModel::add_cable(const Edit& e) {
   return fmt::format("cable {} from {} pulls with {:.3g} kN", c.name, m.name, e.pretension / unit::kN);
 }
 
+size_t LiveModel::count_own_cables() const {
+  const auto is_added = [](const Applied& a) { return a.edit.kind == Edit::Kind::AddCable; };
+  return plan_.cables.size() - static_cast<size_t>(std::count_if(applied_.begin(), applied_.end(), is_added));
+}
+
+bool LiveModel::has_added_cable(const std::string& name) const {
+  return std::any_of(plan_.cables.begin() + static_cast<std::ptrdiff_t>(count_own_cables()), plan_.cables.end(),
+                     [&name](const product::Cable& c) { return c.name == name; });
+}
+
 bool LiveModel::lets_go(const std::string& cable) const {
   return std::find(cables_off_.begin(), cables_off_.end(), cable) != cables_off_.end();
 }
 
-std::string LiveModel::remove_cable(const Edit& e, double next) {
-  const std::vector<mbs::Cable>& cables = built_.model.cables;
+std::string LiveModel::remove_cable(const Edit& e, double time, double next) {
+  std::vector<mbs::Cable>& cables = built_.model.cables;
   for (size_t i = 0; i < cables.size(); ++i) {
     if (cables[i].name != e.cable) continue;
     if (lets_go(e.cable)) throw InputError("E931", "cable \"" + e.cable + "\" is let go already");
     cables_off_.push_back(e.cable);
+    constexpr double nothing = 1e-6;  // [N/m]
+    if (time <= 0 && has_added_cable(e.cable)) cables[i].pretension = 0, cables[i].stiffness = nothing;
     Extra x;
     x.event.time = next;
     x.event.name = "cable " + e.cable + " let go";

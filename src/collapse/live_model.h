@@ -46,6 +46,8 @@ class LiveModel {
     double time = 0;  // [s]
   };
   const std::vector<Applied>& applied() const { return applied_; }
+  size_t count_own_cables() const;  // of the plan, before those that edits added
+  bool has_added_cable(const std::string& name) const;
   /// Law that a zone of the map follows before it is fired: of an element, or of a rotational one behind them; -1:
   /// none.
   int law_of_zone(size_t zone) const;
@@ -68,7 +70,7 @@ class LiveModel {
   std::string remove_charge(const Edit&, double time);
   std::string add_pre_cut(const Edit&, double time);
   std::string add_cable(const Edit&);
-  std::string remove_cable(const Edit&, double next);
+  std::string remove_cable(const Edit&, double time, double next);
   std::string set_friction(const Edit&);
   LiveCharge& unfired(int charge, double time);
   int member_named(const std::string&) const;

@@ -22,6 +22,7 @@ std::vector<StageTimes> find_stage_times(const ModelMap& map, bool all) {
   }
   std::vector<StageTimes> out;
   for (const auto& [s, t] : times) out.push_back(t);
+  std::stable_sort(out.begin(), out.end(), [](const StageTimes& a, const StageTimes& b) { return a.first < b.first; });
   return out;
 }
 

@@ -339,6 +339,15 @@ void Recorder::follow(const Recorder& before, double until) {
     if (told.first <= until) stages_told_.push_back(told);
   for (const double t : before.contacts_told_)
     if (t <= until) contacts_told_.push_back(t);
+  constexpr double rounding = 1e-9;  // [s]
+  const std::vector<double>& times = before.record_.time;
+  const auto Z = static_cast<std::ptrdiff_t>(before.record_.zones.size()),
+             frame = std::upper_bound(times.begin(), times.end(), until + rounding) - times.begin() - 1;
+  states_before_ = before.states_before_;
+  if (frame >= 0 && Z > 0) {
+    const auto first = before.record_.zone_state.begin() + frame * Z;
+    states_before_.assign(first, first + Z);
+  }
   if (before.last_time_ <= until) {
     last_time_ = before.last_time_;
     last_v_ = before.last_v_;
@@ -411,7 +420,7 @@ void Recorder::pass(Io& io, R& r) {
   pass_events(io, record.events), pass_events(io, r.coming_);
   io(r.start_), io(r.block_), io(r.zone_frames_), io(r.shortening_), io(r.crushed_), io(r.stages_told_), io(r.last_v_),
       io(r.last_time_), io(r.touchdowns_), io(r.first_), io(r.speeds_.velocity), io(r.speeds_.spin),
-      io(r.reaction_error_), io(r.impulse_until_now_), io(r.impulse_), io(r.contacts_told_);
+      io(r.reaction_error_), io(r.impulse_until_now_), io(r.impulse_), io(r.contacts_told_), io(r.states_before_);
 }
 
 void Recorder::write(ArchiveWriter& out) const { pass(out, *this); }
@@ -459,7 +468,10 @@ void Recorder::add_frame(const mbs::View& v) {
     if (const StubEntry* stub = find_crushed_stub(i, v)) {
       state = record::ZoneState::Crushed;
       const size_t frames = zone_frames_.size(), Z = record_.zones.size();
-      if (frames == 0 || record_.zone_state[(frames - 1) * Z + i] != static_cast<std::uint8_t>(state))
+      const auto was = frames > 0                  ? record_.zone_state[(frames - 1) * Z + i]
+                       : i < states_before_.size() ? states_before_[i]
+                                                   : static_cast<std::uint8_t>(record::ZoneState::Elastic);
+      if (was != static_cast<std::uint8_t>(state))
         add_event({v.time, "crushing", stub->member, fmt::format("the stub of {} is being crushed", stub->member)});
     }
     record_.zone_state.push_back(static_cast<std::uint8_t>(state));
@@ -564,7 +576,8 @@ void Recorder::add_happening(const mbs::Happening& h) {
         add_event({h.time, "edit", entry.member, entry.note});
         break;
       }
-      if (stages_told_.empty() || entry.stage > stages_told_.back().second) {
+      if (std::none_of(stages_told_.begin(), stages_told_.end(),
+                       [&entry](const auto& told) { return told.second == entry.stage; })) {
         stages_told_.emplace_back(h.time, entry.stage);
         add_event({h.time, "stage", map_.stages[static_cast<size_t>(entry.stage)],
                    map_.stages[static_cast<size_t>(entry.stage)]});

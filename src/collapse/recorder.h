@@ -116,6 +116,7 @@ class Recorder {
   std::vector<mbs::CrushedBox> crushed_;  // of the last frame, as Record::crushed_ends; shapes as drawn
   std::vector<int> fixed_joints_;
   std::vector<std::pair<double, int>> stages_told_;  // when, which
+  std::vector<std::uint8_t> states_before_;          // of the zones at the last frame of the recorder followed
   std::vector<Vec3> last_v_;                         // of the bodies at the last frame
   double last_time_ = 0;
   std::vector<Touchdown> touchdowns_;

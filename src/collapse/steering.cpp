@@ -20,12 +20,15 @@ void tell_edit(const Edit& e, const std::string& text, double time, LiveRun& run
 }
 
 /// Whether an edit changes what the first evaluation of forces has acted upon already, before the first step.
-bool changes_start(const Edit& e, const mbs::Moment& moment, const mbs::Model& model) {
+bool changes_start(const Edit& e, const mbs::Moment& moment, const LiveModel& live) {
   if (moment.steps > 0) return false;
   using Kind = Edit::Kind;
-  if (e.kind == Kind::AddCable || e.kind == Kind::RemoveCable || e.kind == Kind::SetFriction) return false;
+  if (e.kind == Kind::AddCable) return true;  // it pulls in the equilibrium
+  // one that has never pulled is taken out of it
+  if (e.kind == Kind::RemoveCable) return live.has_added_cable(e.cable);
+  if (e.kind == Kind::SetFriction) return false;
   const auto is_due = [&](const mbs::Event& event) { return event.time <= moment.time; };
-  return !moment.fired.empty() || std::any_of(model.events.begin(), model.events.end(), is_due);
+  return !moment.fired.empty() || std::any_of(live.model().events.begin(), live.model().events.end(), is_due);
 }
 
 /// Whether it sets what is there already, so that the run goes on with the bits that it would have had.
@@ -270,7 +273,7 @@ Steering::Made Steering::edit(const Edit& e, const std::string& name, bool in_pl
   made.text = model->apply(e, moment.time, moment.next_time);
   made.time = moment.time;
   made.step = moment.steps;
-  const bool is_anew = changes_start(e, moment, model->model());
+  const bool is_anew = changes_start(e, moment, *model);
   std::shared_ptr<LiveRun> run;
   if (is_anew) {
     run = std::make_shared<LiveRun>(std::move(model), options_.run, options_.moment_interval);

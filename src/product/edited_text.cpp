@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numbers>
 #include <set>
 
 #include "base/utf8.h"
@@ -106,7 +107,7 @@ class Editor {
   static bool is_alike(const Charge& a, const Charge& b) {
     return a.position == b.position && a.destroyed_length == b.destroyed_length && a.residual_bars == b.residual_bars &&
            a.transition_damage == b.transition_damage && a.delay == b.delay && a.scatter == b.scatter &&
-           a.fails == b.fails;
+           a.fails == b.fails && a.azimuth == b.azimuth && a.opening == b.opening;
   }
   bool is_as_it_was(const std::pair<int, int>& place, const Charge& now) const {
     for (const Stage& s : before_.stages)
@@ -160,6 +161,8 @@ class Editor {
       if (c.delay > 0) out += fmt::format("delay = {}\n", quantity(c.delay, "s"));
       if (c.scatter > 0) out += fmt::format("scatter = {}\n", quantity(c.scatter, "s"));
       if (c.fails) out += "fails = true\n";
+      if (c.opening > 0 && c.opening < 2 * std::numbers::pi * (1 - 1e-12))
+        out += fmt::format("azimuth = {}\nopening = {}\n", quantity(c.azimuth, "rad"), quantity(c.opening, "rad"));
     }
     return out + "\n";
   }

@@ -290,10 +290,12 @@ std::shared_ptr<Client> Hub::connect(std::shared_ptr<Outlet> outlet, const std::
       client = std::make_shared<Client>(make_token());
       clients_[client->token()] = client;
     }
-    if (const auto it = sessions_.find(client->session); it != sessions_.end())
+    if (const auto it = sessions_.find(client->session); it != sessions_.end()) {
       session = it->second;
-    else if (!sessions_.empty())
-      session = sessions_.begin()->second;
+    } else {
+      is_back = false;  // its events were those of a session that is gone
+      if (!sessions_.empty()) session = sessions_.begin()->second;
+    }
   }
   // commands that come before hello are of it, too
   if (session) client->session = session->id();
@@ -376,6 +378,7 @@ void Hub::receive(const std::shared_ptr<Client>& client, const std::string& text
     }
     if (word == "study.start") return start_study(client, id, command, session);
     if (word == "study.play") return play_sample(client, id, command, session);
+    if (word == "sample") throw InputError("E911", "there is no command \"sample\"", "did you mean \"study.play\"?");
     session->post(client, id, command);
   } catch (const InputError& e) {
     client->answer(id, dump(make_error(id, describe_error(e))));
@@ -506,65 +509,68 @@ void Hub::start_study(const std::shared_ptr<Client>& client, std::int64_t id, co
   setting.jobs = options_.study_jobs;
   setting.rules = options_.session.rules;
   setting.version = options_.session.steering.run.program_version;
-  session->ask([this, client, id, setting, with_edits](Session& s) {
-    if (s.steering() == nullptr) {
-      client->answer(id, dump(make_error(id, describe_error(InputError("E930", "there is no plan that can be run")))));
-      return;
-    }
-    // of the active branch: the plan it began from, with its edits
-    const collapse::LiveModel& live = s.steering()->steering().active().run().model();
-    collapse::BranchPlan branch;
-    if (with_edits)
-      branch = collapse::write_branch_plan(live);
-    else
-      branch.text = live.plan().text;
-    const std::string path = live.plan().path;
-    run_errand([this, client, id, setting, branch, path]() mutable {
-      const std::string& text = branch.text;
-      try {
-        std::vector<Diagnostic> warnings;
-        const product::Plan plan = product::read_plan(text, path, warnings);
-        int number = 0;
-        std::shared_ptr<StudyTask> ended;  // let go without the lock: it waits for its thread
-        {
-          const std::lock_guard lock(mutex_);
-          if (studies_.size() >= kMostStudies) {
-            const auto oldest = std::find_if(studies_.begin(), studies_.end(), [](const auto& one) {
-              return one.second->describe()["state"] != "running";
-            });
-            if (oldest == studies_.end())
-              throw InputError("E905", fmt::format("{} studies are running", kMostStudies),
-                               "cancel one, or wait until one has ended");
-            ended = std::move(oldest->second);
-            study_watchers_.erase(oldest->first);
-            studies_.erase(oldest);
+  session->ask(
+      [this, client, id, setting, with_edits](Session& s) {
+        if (s.steering() == nullptr) {
+          client->answer(id,
+                         dump(make_error(id, describe_error(InputError("E930", "there is no plan that can be run")))));
+          return;
+        }
+        // of the active branch: the plan it began from, with its edits
+        const collapse::LiveModel& live = s.steering()->steering().active().run().model();
+        collapse::BranchPlan branch;
+        if (with_edits)
+          branch = collapse::write_branch_plan(live);
+        else
+          branch.text = live.plan().text;
+        const std::string path = live.plan().path;
+        run_errand([this, client, id, setting, branch, path]() mutable {
+          const std::string& text = branch.text;
+          try {
+            std::vector<Diagnostic> warnings;
+            const product::Plan plan = product::read_plan(text, path, warnings);
+            int number = 0;
+            std::shared_ptr<StudyTask> ended;  // let go without the lock: it waits for its thread
+            {
+              const std::lock_guard lock(mutex_);
+              if (studies_.size() >= kMostStudies) {
+                const auto oldest = std::find_if(studies_.begin(), studies_.end(), [](const auto& one) {
+                  return one.second->describe()["state"] != "running";
+                });
+                if (oldest == studies_.end())
+                  throw InputError("E905", fmt::format("{} studies are running", kMostStudies),
+                                   "cancel one, or wait until one has ended");
+                ended = std::move(oldest->second);
+                study_watchers_.erase(oldest->first);
+                studies_.erase(oldest);
+              }
+              number = ++last_study_;
+            }
+            ended.reset();
+            // the same plan, limit and seed go on where they were
+            setting.folder = (fs::path(options_.session.folder) /
+                              ("study-" + calc_sha256(text + std::to_string(setting.seed)).substr(0, 12)))
+                                 .string();
+            auto study = std::make_shared<StudyTask>(
+                number, plan, setting,
+                [this, number](const Json& state, const Json& samples) { tell_study(number, state, samples); });
+            {
+              const std::lock_guard lock(mutex_);
+              studies_[number] = study;
+              study_watchers_[number].push_back(client);
+            }
+            client->answer(id, dump(make_ack(id, {{"study", number},
+                                                  {"taken", branch.taken},
+                                                  {"left_out", branch.left_out},
+                                                  {"state", study->describe()}})));
+          } catch (const InputError& e) {
+            client->answer(id, dump(make_error(id, describe_error(e))));
+          } catch (const std::exception& e) {
+            client->answer(id, dump(make_error(id, describe_error(InputError("E940", e.what())))));
           }
-          number = ++last_study_;
-        }
-        ended.reset();
-        // the same plan, limit and seed go on where they were
-        setting.folder = (fs::path(options_.session.folder) /
-                          ("study-" + calc_sha256(text + std::to_string(setting.seed)).substr(0, 12)))
-                             .string();
-        auto study = std::make_shared<StudyTask>(
-            number, plan, setting,
-            [this, number](const Json& state, const Json& samples) { tell_study(number, state, samples); });
-        {
-          const std::lock_guard lock(mutex_);
-          studies_[number] = study;
-          study_watchers_[number].push_back(client);
-        }
-        client->answer(id, dump(make_ack(id, {{"study", number},
-                                              {"taken", branch.taken},
-                                              {"left_out", branch.left_out},
-                                              {"state", study->describe()}})));
-      } catch (const InputError& e) {
-        client->answer(id, dump(make_error(id, describe_error(e))));
-      } catch (const std::exception& e) {
-        client->answer(id, dump(make_error(id, describe_error(InputError("E940", e.what())))));
-      }
-    });
-  });
+        });
+      },
+      client, id);
 }
 
 void Hub::play_sample(const std::shared_ptr<Client>& client, std::int64_t id, const Json& command,

@@ -44,11 +44,7 @@ void RecordWorker::serve(const collapse::Steering& steering) {
         const collapse::Branch& b = steering.branch(id);
         if (b.frames() == 0) throw InputError("E930", "the branch has no frame yet");
         Copy copy{steering.copy_record(b), {}};
-        for (const collapse::Branch* at = &b;; at = &steering.branch(at->parent)) {
-          for (auto e = at->edits.rbegin(); e != at->edits.rend(); ++e) copy.edits.push_back({e->time, e->text});
-          if (at->parent == 0) break;
-        }
-        std::reverse(copy.edits.begin(), copy.edits.end());
+        for (const collapse::LiveModel::Applied& e : b.run().model().applied()) copy.edits.push_back({e.time, e.text});
         job->copies.push_back(std::move(copy));
       }
     } catch (const InputError& e) {

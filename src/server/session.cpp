@@ -10,6 +10,7 @@
 #include "base/hash.h"
 #include "collapse/edit_json.h"
 #include "product/plan_sampler.h"
+#include "study/plan_mapping.h"
 
 namespace topple::server {
 
@@ -25,8 +26,11 @@ double since(std::chrono::steady_clock::time_point t) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - t).count();
 }
 
+/// Of a study's sample, which ends as long after its last stage as runs of the study do.
 product::Plan make_sample_plan(const product::Plan& base, const std::vector<double>& inputs) {
-  return product::make_sample(product::make_sampler(base), inputs);
+  product::Plan plan = product::make_sample(product::make_sampler(base), inputs);
+  plan.analysis.duration = (plan.stages.empty() ? 0 : plan.stages.back().time) + study::find_after(base);
+  return plan;
 }
 
 }  // namespace
@@ -77,10 +81,10 @@ Json Session::brief() const {
   return brief_;
 }
 
-void Session::ask(std::function<void(Session&)> call) {
+void Session::ask(std::function<void(Session&)> call, std::shared_ptr<Client> client, std::int64_t id) {
   {
     const std::lock_guard lock(mutex_);
-    tasks_.push_back({nullptr, 0, {}, std::move(call)});
+    tasks_.push_back({std::move(client), id, {}, std::move(call)});
   }
   wakes_.notify_all();
 }

@@ -60,7 +60,8 @@ class Session {
   /// A command of a client; it is answered.
   void post(std::shared_ptr<Client>, std::int64_t id, Json command);
   /// Runs in the session's thread.
-  void ask(std::function<void(Session&)>);
+  /// A client whose command it answers is told if the session is closed before.
+  void ask(std::function<void(Session&)>, std::shared_ptr<Client> = nullptr, std::int64_t id = 0);
 
   /// Begins to tell a client; hello, or what it missed after an event.
   void welcome(const std::shared_ptr<Client>&, std::optional<long> after = std::nullopt);

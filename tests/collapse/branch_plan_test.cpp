@@ -162,6 +162,23 @@ TEST(BranchPlan, ForgetsCablesThatNeverPull) {
   EXPECT_EQ(late.left_out.size(), 1U);
 }
 
+TEST(BranchPlan, KeepsTheSectorsOfShafts) {
+  std::string text;
+  std::vector<Diagnostic> warnings;
+  const product::Plan plan = product::read_plan_file(TOPPLE_SOURCE_DIR "/examples/templates/chimney.toml", warnings, text);
+  ASSERT_LT(plan.stages.front().charges.front().opening, 6);
+  const BranchPlan same =
+      write_branch_plan(edited(plan, {{0, R"({"command": "set_delay", "charge": 0, "delay": 0.2})"}}));
+  EXPECT_TRUE(same.left_out.empty());
+  const product::Plan again = read(same.text);
+  ASSERT_EQ(again.stages.front().charges.size(), plan.stages.front().charges.size());
+  for (size_t i = 0; i < plan.stages.front().charges.size(); ++i) {
+    const product::Charge &was = plan.stages.front().charges[i], &is = again.stages.front().charges[i];
+    EXPECT_NEAR(is.azimuth, was.azimuth, 1e-12);
+    EXPECT_NEAR(is.opening, was.opening, 1e-12);
+  }
+}
+
 TEST(BranchPlan, KeepsWhatFuzzyPathsName) {
   const std::string fuzzy = "[fuzzy]\nstage.2.charge.1.delay = { triangular = [\"0 ms\", \"0 ms\", \"30 ms\"] }\n";
   const product::Plan plan = staged(fuzzy);

@@ -561,6 +561,29 @@ TEST(Steering, ACableComesAndGoes) {
   EXPECT_LT(largest_residual(s.make_record(s.active()), 10), default_knowledge().verification_energy_error);
 }
 
+TEST(Steering, EditsBeforeTheFirstStepDoNotHangOnTheirOrder) {
+  const Edit cable = read_edit(Json::parse(R"({"command": "add_cable", "member": "C-A2-1", "position": 1.5,
+      "anchor": [-15, 4, 0], "stiffness": 2e6, "pretension": 2e5})")),
+             later = read_edit(Json::parse(R"({"command": "set_delay", "charge": 0, "delay": 0.05})"));
+  const auto run = [&](const std::vector<Edit>& edits) {
+    Steering s(default_knowledge(), options());
+    EXPECT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+    for (const Edit& e : edits) s.edit(e);
+    advance_until(s, 0.2);
+    return s.make_record(s.active());
+  };
+  const record::Record a = run({cable, later}), b = run({later, cable}), none = run({later});
+  EXPECT_EQ(a.position, b.position);
+  EXPECT_NE(a.position, none.position);
+  // one that is let go at once has never pulled
+  Edit off;
+  off.kind = Edit::Kind::RemoveCable;
+  off.cable = "added 1";
+  const record::Record never = run({cable, off, later});
+  ASSERT_EQ(never.position.size(), none.position.size());
+  for (size_t i = 0; i < none.position.size(); ++i) EXPECT_NEAR(never.position[i], none.position[i], 1e-5);
+}
+
 TEST(Steering, RefusedEditsChangeNothing) {
   Steering s(default_knowledge(), options());
   ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
