@@ -95,6 +95,9 @@ bool read_storeys(Reading& reading, TableReader& root) {
         plan.storey_loads[i] = calc_floor_mass(
             read_quantity(load->items[i], "storeys: load", Dimension::AreaLoad, loads, reading.complaints));
     }
+  } else {
+    plan.storey_loads.assign(plan.storey_heights.size(),
+                             calc_floor_mass(table.quantity("load", Dimension::AreaLoad, loads, 0)));
   }
   table.finish();
   return !plan.storey_heights.empty() && reading.complaints.error_count() == errors_before;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <limits>
 
 #include "product/reading.h"
 
@@ -228,7 +229,9 @@ void read_shafts(Reading& reading, TableReader& root) {
     s.thickness_top = table.quantity("thickness_top", Dimension::Length, thicknesses, s.thickness_foot);
     read_material(reading, table, s);
     read_weights(table, s, height);
-    s.joint_spacing = table.quantity("joint_spacing", Dimension::Length, {0.5, 500}, 0);
+    const double spacing =
+        table.quantity("joint_spacing", Dimension::Length, {0.5, 500}, std::numeric_limits<double>::quiet_NaN());
+    s.joint_spacing = std::isnan(spacing) ? 0 : spacing;
     table.finish();
     if (table.is_table()) check_shape(table, s);
     m.shaft = static_cast<int>(reading.plan.shafts.size());

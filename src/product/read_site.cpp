@@ -211,7 +211,9 @@ void read_analysis(Reading& reading, TableReader& root) {
   TableReader table(*node, "analysis", reading.complaints);
   Analysis& a = reading.plan.analysis;
   a.duration = table.quantity("duration", Dimension::Time, limits::duration);
-  a.step = table.quantity("step", Dimension::Time, limits::step, 0);
+  const double chosen = std::numeric_limits<double>::quiet_NaN();  // by the engine
+  const double step = table.quantity("step", Dimension::Time, limits::step, chosen);
+  a.step = std::isnan(step) ? 0 : step;
   a.frame_rate = table.quantity("frame_rate", Dimension::Frequency, limits::frame_rate, a.frame_rate);
   a.gravity = table.quantity("gravity", Dimension::Acceleration, {0, 100, true}, a.gravity);
   a.seed =

@@ -108,9 +108,12 @@ Confirmation judge_confirmation(const uncertainty::Space& space, const AlphaResu
           const double value = run.whole.values[o];
           if (!std::isfinite(b.whole) || sign * value > sign * b.whole) b.whole = value;
         }
-        if (bound.sample >= 0 && find(bound.sample) != nullptr && std::isfinite(b.whole)) {
+        if (bound.sample >= 0 && std::isfinite(b.whole)) {
           const double beyond = sign * (b.whole - bound.value);
-          b.state = beyond > slack ? State::Exceeded : beyond < -slack ? State::NotReached : State::Confirmed;
+          if (beyond > slack)
+            b.state = State::Exceeded;  // whichever run does
+          else if (find(bound.sample) != nullptr)
+            b.state = beyond < -slack ? State::NotReached : State::Confirmed;
         }
         out.bounds.push_back(b);
       }

@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <ctime>
 #include <limits>
 #include <mutex>
 #include <numbers>
+#include <optional>
 
 #include "base/heap.h"
 #include "base/interpolate.h"
@@ -133,32 +135,48 @@ struct PlanMapping::Impl {
 };
 
 void PlanMapping::check_firing(const product::Plan& plan, const Impl& impl) {
-  const auto check = [&](const product::Plan& sample, const std::string& with) {
+  const auto check = [&](const product::Plan& sample, const std::string& with, const SourcePosition& where) {
     const double release = sample.stages.empty() ? 0 : sample.stages.back().time;
     for (size_t i = 0; i < sample.stages.size(); ++i)
       for (const product::Charge& c : sample.stages[i].charges) {
         const double late = sample.stages[i].time + c.delay - release;
         if (c.fails || late < impl.options.after) continue;
-        throw InputError("E407",
-                         fmt::format("{}: a charge of stage {} fires {:g} s after the last stage{}, when the runs of a "
-                                     "study have ended ({:g} s)",
-                                     plan.path, i + 1, late, with, impl.options.after),
-                         plan.fuzzy.search.after > 0 ? "raise after in [fuzzy.search], or leave it out"
-                                                     : "raise duration in [analysis]");
+        throw InputError({{Severity::Error, "E407", where, 1,
+                           fmt::format("a charge of stage {} fires {:g} s after the last stage{}, when the runs of a "
+                                       "study have ended ({:g} s)",
+                                       i + 1, late, with, impl.options.after),
+                           plan.fuzzy.search.after > 0 ? "raise after in [fuzzy.search], or leave it out"
+                                                       : "raise duration in [analysis]"}});
       }
   };
-  check(plan, "");
+  check(plan, "", {plan.path, 0, 0});
   const std::vector<double> centre = product::calc_centre(plan.fuzzy);
-  for (size_t i = 0; i < centre.size(); ++i) {
-    std::vector<double> point = centre;
-    point[i] = plan.fuzzy.inputs[i].corners.back().first;
-    if (!product::is_possible(plan.fuzzy, point)) continue;
+  const std::vector<product::FuzzyValue>& inputs = plan.fuzzy.inputs;
+  const auto try_point = [&](const std::vector<double>& point, const std::string& with, const SourcePosition& where) {
+    if (!product::is_possible(plan.fuzzy, point)) return;
     try {
-      check(product::make_sample(impl.sampler, point), " with " + product::text_of(plan.fuzzy.inputs[i], point[i]));
+      check(product::make_sample(impl.sampler, point), with, where);
     } catch (const InputError& e) {
       if (e.first_error().code == "E407") throw;  // anything else is a failed run
     }
-  }
+  };
+  // the ends of each value, and of each two
+  const auto ends = [&](size_t i) {
+    return std::array{inputs[i].corners.front().first, inputs[i].corners.back().first};
+  };
+  for (size_t i = 0; i < centre.size(); ++i)
+    for (const double end : ends(i)) {
+      std::vector<double> point = centre;
+      point[i] = end;
+      const std::string with = " with " + product::text_of(inputs[i], end);
+      try_point(point, with, inputs[i].where);
+      for (size_t j = i + 1; j < centre.size(); ++j)
+        for (const double other : ends(j)) {
+          point[j] = other;
+          try_point(point, fmt::format("{} and {}", with, product::text_of(inputs[j], other)), inputs[i].where);
+          point[j] = centre[j];
+        }
+    }
 }
 
 PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k, PlanMappingOptions options) {
@@ -217,8 +235,20 @@ PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k
       off.push_back(support.left +
                     (0.37 + 0.01 * static_cast<double>(off.size() % 20)) * (support.right - support.left));
     }
-    const product::Plan sample = product::make_sample(impl->sampler, off);
-    const product::Plan* both[] = {&plan, &sample};
+    // nearer to the middle where it is no plan
+    const std::vector<double> centre = product::calc_centre(plan.fuzzy);
+    std::optional<product::Plan> sample;
+    constexpr int most = 20;
+    for (int tries = 0; tries < most && !sample; ++tries) {
+      try {
+        if (product::is_possible(plan.fuzzy, off)) sample = product::make_sample(impl->sampler, off);
+      } catch (const InputError&) {
+        // below
+      }
+      for (size_t i = 0; i < off.size(); ++i) off[i] = 0.5 * (off[i] + centre[i]);
+    }
+    if (!sample) sample = product::make_sample(impl->sampler, centre);
+    const product::Plan* both[] = {&plan, &*sample};
     impl->condensation = collapse::find_like_frames(both, k);
     if (!impl->condensation.refusal.empty())
       throw InputError("E206", "the plan cannot be condensed: " + impl->condensation.refusal,

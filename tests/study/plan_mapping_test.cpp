@@ -336,7 +336,7 @@ TEST(PlanMapping, RefusesChargesThatFireWhenRunsAreOver) {
   EXPECT_EQ(refuse(text), "");
   const std::string late =
       product::replaced(text, "destroyed_length = \"1.2 m\"", "destroyed_length = \"1.2 m\"\ndelay = \"0.8 s\"");
-  EXPECT_THAT(refuse(late), testing::HasSubstr("E407 plan.toml: a charge of stage 1 fires 0.7 s after the last stage"));
+  EXPECT_THAT(refuse(late), testing::HasSubstr("E407 a charge of stage 1 fires 0.7 s after the last stage"));
   const std::string maybe = product::replaced(
       text,
       "storeys.load =", "stage.1.charge.1.delay = { triangular = [\"0 s\", \"0 s\", \"0.9 s\"] }\nstoreys.load =");
