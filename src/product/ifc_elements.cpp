@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <set>
 #include <string_view>
@@ -103,6 +104,7 @@ class Reader {
   IfcBuilding read() {
     out_.schema = file_.schema;
     check_coordinates();
+    check_references();
     read_units();
     for (const StepEntity* b : file_.of_type("IFCBUILDING")) out_.name = b->at(2).text;
     read_storeys();
@@ -162,6 +164,25 @@ class Reader {
   }
 
   /// Coordinates that are no numbers would be zeros.
+  /// What places and outlines refer to is there.
+  void check_references() const {
+    static const std::set<std::string> checked{"IFCAXIS2PLACEMENT2D", "IFCAXIS2PLACEMENT3D",  "IFCPOLYLINE",
+                                               "IFCPOLYLOOP",         "IFCEXTRUDEDAREASOLID", "IFCINDEXEDPOLYCURVE"};
+    for (const auto& [id, e] : file_.entities) {
+      if (!checked.contains(e.type)) continue;
+      const std::function<void(const StepValue&)> look = [&, n = id, &entity = e](const StepValue& v) {
+        if (v.kind == Kind::Reference && get(v) == nullptr)
+          throw InputError(std::vector<Diagnostic>{{Severity::Error,
+                                                    "E111",
+                                                    {name_, entity.line, entity.column},
+                                                    1,
+                                                    fmt::format("#{} refers to #{}, which is not there", n, v.id()),
+                                                    "the file is incomplete: export it again"}});
+        for (const StepValue& item : v.items) look(item);
+      };
+      for (const StepValue& v : e.arguments) look(v);
+    }
+  }
   void check_coordinates() const {
     const auto is_tuple = [](const StepValue& v, size_t least) {
       return v.kind == Kind::List && v.items.size() >= least && v.items.size() <= 3 &&
@@ -414,15 +435,39 @@ class Reader {
            });
   }
   /// Outline and holes of a profile in its own plane; a circle as a polygon.
-  bool find_profile(const StepValue& v, std::vector<Loop>& out, bool& is_round, std::string& why) const {
+  bool find_profile(const StepValue& v, std::vector<Loop>& out, bool& is_round, std::string& why, int depth = 0) const {
     const StepEntity* e = get(v);
     if (e == nullptr) return false;
+    if (depth > 10) {
+      why = "its profile is nested too deeply";
+      return false;
+    }
     const double u = out_.length_unit;
     why = "its profile is " + e->type;
     if (e->type == "IFCRECTANGLEPROFILEDEF" || e->type == "IFCROUNDEDRECTANGLEPROFILEDEF") {
       const Pose at = axis_placement(e->at(2));
       const double x = 0.5 * e->at(3).number * u, y = 0.5 * e->at(4).number * u;
-      out.push_back({at * Vec3{-x, -y, 0}, at * Vec3{x, -y, 0}, at * Vec3{x, y, 0}, at * Vec3{-x, y, 0}});
+      const double radius = e->type == "IFCROUNDEDRECTANGLEPROFILEDEF"
+                                ? std::clamp(e->at(5).number * u, 0.0, std::max(0.0, std::min(x, y)))
+                                : 0;
+      if (!(radius > 0)) {
+        out.push_back({at * Vec3{-x, -y, 0}, at * Vec3{x, -y, 0}, at * Vec3{x, y, 0}, at * Vec3{-x, y, 0}});
+        return x > 0 && y > 0;
+      }
+      Loop loop;
+      const auto add = [&loop](const Vec3& p) {
+        if (loop.empty() || norm(p - loop.back()) > 1e-6) loop.push_back(p);
+      };
+      constexpr int pieces = 18;  // of a quarter
+      for (int corner = 0; corner < 4; ++corner)
+        for (int i = 0; i <= pieces; ++i) {
+          const double angle = (corner + 2 + static_cast<double>(i) / pieces) * 0.5 * std::acos(-1.0);
+          const double sx = corner == 1 || corner == 2 ? 1 : -1, sy = corner >= 2 ? 1 : -1;
+          add(at * Vec3{sx * (x - radius) + radius * std::cos(angle), sy * (y - radius) + radius * std::sin(angle), 0});
+        }
+      if (norm(loop.front() - loop.back()) <= 1e-6) loop.pop_back();
+      is_round |= is_circle(loop);
+      out.push_back(std::move(loop));
       return x > 0 && y > 0;
     }
     if (e->type == "IFCCIRCLEPROFILEDEF") {
@@ -448,7 +493,7 @@ class Reader {
     if (e->type == "IFCDERIVEDPROFILEDEF" || e->type == "IFCMIRROREDPROFILEDEF") {
       const StepEntity* moved = get(e->at(3));
       if (moved == nullptr && e->type == "IFCDERIVEDPROFILEDEF") return false;
-      if (!find_profile(e->at(2), out, is_round, why)) return false;
+      if (!find_profile(e->at(2), out, is_round, why, depth + 1)) return false;
       for (Loop& loop : out)
         for (Vec3& p : loop) p = moved == nullptr ? Vec3{-p.x, p.y, p.z} : transform(*moved) * p;
       return true;
@@ -573,11 +618,18 @@ class Reader {
     }
     if (is_boolean(e)) return find_boolean(e, X, out, depth);
     if (e->type == "IFCMAPPEDITEM") {
+      const int source = e->at(0).id();
+      if (std::find(open_maps_.begin(), open_maps_.end(), source) != open_maps_.end()) {
+        out.why = "its body is part of itself";
+        return false;
+      }
+      open_maps_.push_back(source);
       bool any = false, all = true;
       for_mapped_items(*e, X, [&](const StepValue& item, const Map& X_WI) {
         const bool is_read = find_item(item, X_WI, out, depth + 1);
         any |= is_read, all &= is_read;
       });
+      open_maps_.pop_back();
       out.is_partial |= any && !all;
       return any;
     }
@@ -900,14 +952,16 @@ class Reader {
     for (const StepEntity* r : file_.of_type("IFCRELDEFINESBYTYPE"))
       for (const StepValue& v : r->at(4).items) type_of_[v.id()] = r->at(5).id();
   }
+  bool is_layer(const StepEntity* e) const { return is(e, "IFCMATERIALLAYER") || is(e, "IFCMATERIALLAYERWITHOFFSETS"); }
   std::string name_of_material(const StepValue& v, int depth) const {
     const StepEntity* e = get(v);
     if (e == nullptr || depth > 6) return {};
     if (e->type == "IFCMATERIAL") return e->at(0).text;
-    if (e->type == "IFCMATERIALLAYER" || e->type == "IFCMATERIALLAYERSETUSAGE" ||
-        e->type == "IFCMATERIALPROFILESETUSAGE")
+    if (is_layer(e) || e->type == "IFCMATERIALLAYERSETUSAGE" || e->type == "IFCMATERIALPROFILESETUSAGE" ||
+        e->type == "IFCMATERIALPROFILESETUSAGETAPERING")
       return name_of_material(e->at(0), depth + 1);
-    if (e->type == "IFCMATERIALPROFILE" || e->type == "IFCMATERIALCONSTITUENT")
+    if (e->type == "IFCMATERIALPROFILE" || e->type == "IFCMATERIALPROFILEWITHOFFSETS" ||
+        e->type == "IFCMATERIALCONSTITUENT")
       return name_of_material(e->at(2), depth + 1);
     const StepValue& list = e->at(e->type == "IFCMATERIALPROFILESET" || e->type == "IFCMATERIALCONSTITUENTSET" ? 2 : 0);
     // of several layers the thickest one carries, of constituents the largest share, or the first
@@ -915,7 +969,7 @@ class Reader {
     std::string name;
     for (const StepValue& item : list.items) {
       const StepEntity* layer = get(item);
-      const double t = is(layer, "IFCMATERIALLAYER")         ? layer->at(1).number
+      const double t = is_layer(layer)                       ? layer->at(1).number
                        : is(layer, "IFCMATERIALCONSTITUENT") ? layer->at(3).number
                                                              : 0;
       if (t > thickest) thickest = t, name = name_of_material(item, depth + 1);
@@ -1107,6 +1161,7 @@ class Reader {
   }
 
   const StepFile& file_;
+  mutable std::vector<int> open_maps_;  // sources of the mapped items that are being read
   const std::string& name_;
   IfcBuilding out_;
   double angle_unit_ = 1;  // of parameters of circles [rad]

@@ -24,6 +24,7 @@ namespace topple::product {
 
 namespace {
 
+constexpr const char* kNoMaterial = "unknown";            // the key of concrete that has no name in the file
 constexpr double kSpacing = limits::line_spacing + 1e-3;  // of grid lines, which are rounded [m]
 const double kRound = std::sqrt(std::acos(-1.0) / 4);     // side of a square over the diameter of a circle of its area
 constexpr double kOverlap = 0.1;                          // of heights in which two elements stand side by side [m]
@@ -299,7 +300,7 @@ class Planner {
   std::string point(int row, int frame) const { return letters(row) + std::to_string(frame + 1); }
 
   static size_t group_of(std::vector<Group>& groups, const IfcElement& e, double width, double height) {
-    const std::string concrete = e.material.empty() ? "unknown" : e.material;
+    const std::string concrete = e.material.empty() ? kNoMaterial : e.material;
     for (size_t i = 0; i < groups.size(); ++i)
       if (groups[i].concrete == concrete && std::abs(groups[i].width - width) < 2e-3 &&
           std::abs(groups[i].height - height) < 2e-3)
@@ -820,10 +821,9 @@ class Planner {
   }
 
   void write_section(const std::string& name, const Group& g, bool is_column) {
-    text_ += fmt::format("[section.{}]\nwidth = {}\nheight = {}\nconcrete = \"{}\"\nsteel = \"bars\"\n", name,
-                         centimetres(g.width), centimetres(g.height), concrete_key(g.concrete));
     const MemberBars bars = find_bars_of(g);
-    if (!bars.grade.empty()) grade_ = bars.grade;
+    text_ += fmt::format("[section.{}]\nwidth = {}\nheight = {}\nconcrete = \"{}\"\nsteel = \"{}\"\n", name,
+                         centimetres(g.width), centimetres(g.height), concrete_key(g.concrete), steel_key(bars.grade));
     write_cover_and_ties(name, bars);
     if (is_column) {
       write_column_bars(name, bars);
@@ -834,7 +834,8 @@ class Planner {
 
   void write_concretes(std::string& out) {
     for (const auto& [key, name] : concretes_) {
-      out += fmt::format("[concrete.{}]  # \"{}\" in the file\n", key, clean_text(name));
+      out += name == kNoMaterial ? fmt::format("[concrete.{}]  # the file names no material\n", key)
+                                 : fmt::format("[concrete.{}]  # \"{}\" in the file\n", key, clean_text(name));
       if (const auto found = find_class(name)) {
         const int fck = found->fck;
         out += fmt::format(
@@ -866,24 +867,51 @@ class Planner {
         }
       } else {
         out += "fc = \"?\"\nEc = \"?\"\n";
-        missing(fmt::format("concrete {}: fc and Ec{}", key, name == "unknown" ? " (the file names no material)" : ""));
+        missing(
+            fmt::format("concrete {}: fc and Ec{}", key, name == kNoMaterial ? " (the file names no material)" : ""));
       }
     }
   }
 
-  void write_steel(std::string& out) {
-    static const std::regex number(R"(([2-6][0-9]0))");
-    std::smatch m;
-    out += "[steel.bars]\n";
-    if (std::regex_search(grade_, m, number)) {
-      out += fmt::format("fy = \"{} N/mm2\"  # characteristic value of {}\n", m[1].str(), clean_text(grade_));
-      taken("steel: fy = " + m[1].str() + " N/mm2 from the grade " + clean_text(grade_));
-      missing("steel: fu and eps_u");
-    } else {
-      out += "fy = \"?\"\n";
-      missing("steel: fy, fu and eps_u");
+  /// One steel of each grade; what has none goes with the first.
+  std::string steel_key(const std::string& grade) {
+    if (grade.empty()) return "bars";
+    auto it = std::find(grades_.begin(), grades_.end(), grade);
+    if (it == grades_.end()) it = grades_.insert(grades_.end(), grade);
+    return it == grades_.begin() ? "bars" : fmt::format("bars_{}", it - grades_.begin() + 1);
+  }
+
+  /// Yield strength that a grade names in N/mm2: its only number of 200 to 690 (of 420/500 the first one); none in
+  /// other units.
+  static std::string find_yield(const std::string& grade) {
+    static const std::regex number(R"((?:^|[^0-9.,/])([2-6][0-9]0)(?![0-9]|[.,][0-9]))"),
+        other_units("psi|ksi", std::regex::icase);
+    if (std::regex_search(grade, other_units)) return {};
+    std::string found;
+    for (std::sregex_iterator m(grade.begin(), grade.end(), number), end; m != end; ++m) {
+      if (!found.empty() && found != (*m)[1].str()) return {};
+      found = (*m)[1].str();
     }
-    out += "fu = \"?\"\neps_u = \"?\"\n";
+    return found;
+  }
+
+  void write_steel(std::string& out) {
+    std::vector<std::string> grades = grades_;
+    if (grades.empty()) grades.emplace_back();
+    for (const std::string& grade : grades) {
+      const std::string key = steel_key(grade), yield = find_yield(grade),
+                        steel = grades.size() > 1 ? "steel " + key : "steel";
+      out += fmt::format("[steel.{}]\n", key);
+      if (!yield.empty()) {
+        out += fmt::format("fy = \"{} N/mm2\"  # characteristic value of {}\n", yield, clean_text(grade));
+        taken(fmt::format("{}: fy = {} N/mm2 from the grade {}", steel, yield, clean_text(grade)));
+        missing(steel + ": fu and eps_u");
+      } else {
+        out += "fy = \"?\"" + (grade.empty() ? std::string() : "  # of the grade " + clean_text(grade)) + "\n";
+        missing(steel + ": fy, fu and eps_u");
+      }
+      out += "fu = \"?\"\neps_u = \"?\"\n";
+    }
   }
 
   static bool is_masonry(const std::string& name) {
@@ -950,7 +978,8 @@ class Planner {
   }
 
   const IfcBuilding& b_;
-  std::string file_, text_, grade_;
+  std::string file_, text_;
+  std::vector<std::string> grades_;  // of the bars, as they are met
   ImportReport report_;
   std::vector<double> rows_, frames_, levels_;
   std::vector<Group> columns_, beams_, slabs_, walls_;
