@@ -18,7 +18,8 @@ namespace topple::collapse {
 using product::Member;
 using product::MemberKind;
 
-constexpr double kUnderJoint = 0.02;  // a charge in a column is at least so far below its joint [m]
+constexpr double kMostInJoint = 1.0 / 3;  // of a short, deep beam, in each joint that has no column
+constexpr double kUnderJoint = 0.02;      // a charge in a column is at least so far below its joint [m]
 
 bool is_along_x(const Vec3& d) { return std::abs(d.x) >= std::abs(d.y) * (1 - 1e-9); }
 
@@ -353,7 +354,7 @@ void Builder::make_beams() {
         const bool has_column = !joint.parts.empty() && joint.parts.front().member >= 0 &&
                                 member(joint.parts.front().member).kind == MemberKind::Column;
         if (has_column) continue;
-        const double share = 0.5 * s.height / z.clear_length;
+        const double share = std::min(0.5 * s.height / z.clear_length, kMostInJoint);
         Part piece = make_part(low, high, mass * share, index);
         piece.half[axis] = std::max(0.5 * s.width, 0.05);
         piece.centre[axis] = face + sign * piece.half[axis];

@@ -54,7 +54,8 @@ struct PartKey {
 
 }  // namespace
 
-std::string to_lsdyna(const product::Plan& plan, const Whole& whole, const collapse::ModelMap& map, double duration) {
+std::string to_lsdyna(const product::Plan& plan, const Whole& whole, const collapse::ModelMap& map, double duration,
+                      double body_friction) {
   const fem::ExplicitModel& fe = whole.fe;
   std::vector<int> charge_of(fe.elements.size(), -1);
   std::vector<double> fires(whole.charges.size(), -1);
@@ -117,7 +118,7 @@ std::string to_lsdyna(const product::Plan& plan, const Whole& whole, const colla
   }
   d.keyword("CONTACT_ERODING_SINGLE_SURFACE");
   d.card(0, 0, 5, 0);
-  d.card(0.5, 0.5, 0.0, 0.0, 20.0);
+  d.card(body_friction, body_friction, 0.0, 0.0, 20.0);
   d.card(1.0, 1.0);
   d.card(1, 1, 1);
   for (const fem::ExplicitGround& g : fe.grounds) {

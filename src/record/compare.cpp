@@ -91,8 +91,13 @@ size_t find_break_up(const std::vector<double>& share) {
   return static_cast<size_t>(std::find_if(share.begin(), share.end(), is_less) - share.begin());
 }
 
+bool has_finding(const Record& r, const std::string& id) {
+  return std::any_of(r.findings.begin(), r.findings.end(), [&id](const Finding& f) { return f.id == id; });
+}
+
 /// When something happened; of a record that ends without it, up to when it did not.
-std::string seconds(double t, double end) {
+std::string seconds(double t, double end, bool is_known = true) {
+  if (!is_known) return "not known";
   return std::isfinite(t) ? fmt::format("{:.2f} s", t) : fmt::format("not up to {:.2f} s", end);
 }
 
@@ -228,14 +233,19 @@ Comparison compare(const Record& a, const Record& b, const std::string& path_a, 
   });
   c.touchdown_a = value_of(a, "touchdown.first");
   c.touchdown_b = value_of(b, "touchdown.first");
+  c.knows_touchdown_a = has_finding(a, "touchdown.first"), c.knows_touchdown_b = has_finding(b, "touchdown.first");
   c.end_a = a.time.back(), c.end_b = b.time.back();
   c.until = std::fmin(c.time.back(), std::fmin(c.touchdown_a, c.touchdown_b));
+  const bool is_known = c.knows_touchdown_a && c.knows_touchdown_b;
+  // of any body, where an upper block is not known
+  if (!is_known && !c.touchdowns.empty())
+    c.until = std::fmin(c.until, std::fmin(c.touchdowns.front().a, c.touchdowns.front().b));
   c.tilt_share = c.tilt_difference = c.tilt_time = kNone;
   const SeriesPair* tilt = find_series(c, "tilt_angle");
   double scale = 0;
   for (size_t i = 0; i < c.time.size() && c.time[i] <= c.until; ++i) {
     c.centre_difference = std::max(c.centre_difference, c.centre[i]);
-    if (!tilt) continue;
+    if (!tilt || !is_known) continue;  // tilts of what is not the same
     const double d = std::abs(tilt->a[i] - tilt->b[i]);
     if (!std::isfinite(d)) continue;
     if (!(d <= c.tilt_difference)) c.tilt_difference = d, c.tilt_time = c.time[i];
@@ -248,8 +258,9 @@ Comparison compare(const Record& a, const Record& b, const std::string& path_a, 
 std::vector<std::string> summarise(const Comparison& c) {
   const double later = c.touchdown_b - c.touchdown_a;
   std::vector<std::string> out = {
-      fmt::format("First touchdown of the upper block: A {}, B {}{}.", seconds(c.touchdown_a, c.end_a),
-                  seconds(c.touchdown_b, c.end_b),
+      fmt::format("First touchdown of the upper block: A {}, B {}{}.",
+                  seconds(c.touchdown_a, c.end_a, c.knows_touchdown_a),
+                  seconds(c.touchdown_b, c.end_b, c.knows_touchdown_b),
                   std::isfinite(c.touchdown_a) && std::isfinite(c.touchdown_b)
                       ? fmt::format(", difference {:+.3f} s", std::abs(later) < 5e-4 ? 0.0 : later)
                       : std::string()),

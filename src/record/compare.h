@@ -37,13 +37,14 @@ struct Comparison {
   std::vector<double> centre;             // distance of the mass centres of everything that moves [m] (T)
   std::vector<TouchdownPair> touchdowns;  // bodies that touch the ground in either, in the order of time
   // up to the earlier first touchdown of the upper block, or the end of the common time
-  double touchdown_a = 0, touchdown_b = 0;  // NaN: none [s]
-  double end_a = 0, end_b = 0;              // of the records [s]
-  double until = 0;                         // [s]
-  double tilt_difference = 0;               // largest |a - b| [rad]; NaN: not known of both
-  double tilt_time = 0;                     // when [s]; NaN likewise
-  double tilt_share = 0;                    // over the larger of both tilts at `until`; NaN: nothing tilts
-  double centre_difference = 0;             // largest distance of mass centres [m]
+  double touchdown_a = 0, touchdown_b = 0;                  // of the upper block; NaN: none, or not known [s]
+  bool knows_touchdown_a = true, knows_touchdown_b = true;  // records of models know no upper block
+  double end_a = 0, end_b = 0;                              // of the records [s]
+  double until = 0;                                         // [s]
+  double tilt_difference = 0;                               // largest |a - b| [rad]; NaN: not known of both
+  double tilt_time = 0;                                     // when [s]; NaN likewise
+  double tilt_share = 0;         // over the larger of both tilts at `until`; NaN: nothing tilts
+  double centre_difference = 0;  // largest distance of mass centres [m]
 };
 
 /// Of two paths the last parts that differ, without extension: "left", "right" of left/record.h5 and right/record.h5.

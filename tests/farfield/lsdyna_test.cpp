@@ -86,7 +86,7 @@ TEST(LsDyna, HoldsTheSameMeshMassesAndLaws) {
   GridOptions options;
   options.size = 0.4;
   const Whole w = make_whole(plan, collapse::default_knowledge(), options, model, map);
-  const std::string text = to_lsdyna(plan, w, map, 2);
+  const std::string text = to_lsdyna(plan, w, map, 2, 0.6);
   EXPECT_EQ(text.rfind("*KEYWORD\n", 0), 0u);
   EXPECT_EQ(text.substr(text.size() - 5), "*END\n");
   const Deck d = read_deck(text);
@@ -132,7 +132,7 @@ TEST(LsDyna, KeepsChargesThatFail) {
   collapse::ModelMap map;
   const mbs::Model model = collapse::make_model(plan, collapse::default_knowledge(), map);
   const Whole w = make_whole(plan, collapse::default_knowledge(), {}, model, map);
-  EXPECT_TRUE(read_deck(to_lsdyna(plan, w, map, 2)).fails_at.empty());
+  EXPECT_TRUE(read_deck(to_lsdyna(plan, w, map, 2, 0.6)).fails_at.empty());
 }
 
 TEST(LsDyna, TitlesAreNoKeywordsAndEndWithACharacter) {
@@ -142,7 +142,7 @@ TEST(LsDyna, TitlesAreNoKeywordsAndEndWithACharacter) {
   const Whole w = make_whole(plan, collapse::default_knowledge(), {}, model, map);
   const auto title = [&](const std::string& given) {
     plan.title = given;
-    const std::string text = to_lsdyna(plan, w, map, 2);
+    const std::string text = to_lsdyna(plan, w, map, 2, 0.6);
     const size_t from = text.find("*TITLE\n") + 7;
     return text.substr(from, text.find('\n', from) - from);
   };
