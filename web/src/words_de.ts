@@ -219,6 +219,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Edit", "Änderung"],
   ["{} fires now, at {:g} s", "{} zündet jetzt, bei {} s"],
   ["{} fires at {:g} s instead of {:g} s", "{} zündet bei {} s statt bei {} s"],
+  ["{} does not fire, as the plan says; it would at {:g} s instead of {:g} s", "{} zündet nicht, wie der Plan es sagt; es wäre bei {} s statt bei {} s"],
   ["a charge on {} at {:.3g} m, destroying {:.3g} m, fires at {:g} s", "Eine Ladung an {} in {} m, die {} m zerstört, zündet bei {} s"],
   ["the charge on {} at {:g} s is taken out", "Die Ladung an {} bei {} s ist herausgenommen"],
   ["{} is cut at {:.3g} m: {:.3g} % of the bars, {:.3g} % of the concrete", "{} ist in {} m angeschnitten: {} % der Stäbe, {} % des Betons"],
