@@ -347,9 +347,7 @@ std::vector<StiffRow> System::calc_spring_stiffness(bool fast, double force_scal
     return tangent > 1e-3 * chord ? tangent : chord;
   };
   // what will pull under the load and does not yet would leave its bodies to swing about it: with what the load gives
-  const auto pull_of = [&](double pull, double stiff) {
-    return !fast && pull == 0 && stiff > 0 ? force_scale : pull;
-  };
+  const auto pull_of = [&](double pull, double stiff) { return !fast && pull == 0 && stiff > 0 ? force_scale : pull; };
   // what is tight also holds its points sideways
   const auto add_between = [&](int a, int b, const Vec3& p_A, const Vec3& p_B, double stiff, double across) {
     const Vec3 d = p_B - p_A;

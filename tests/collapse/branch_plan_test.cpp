@@ -165,7 +165,8 @@ TEST(BranchPlan, ForgetsCablesThatNeverPull) {
 TEST(BranchPlan, KeepsTheSectorsOfShafts) {
   std::string text;
   std::vector<Diagnostic> warnings;
-  const product::Plan plan = product::read_plan_file(TOPPLE_SOURCE_DIR "/examples/templates/chimney.toml", warnings, text);
+  const product::Plan plan =
+      product::read_plan_file(TOPPLE_SOURCE_DIR "/examples/templates/chimney.toml", warnings, text);
   ASSERT_LT(plan.stages.front().charges.front().opening, 6);
   const BranchPlan same =
       write_branch_plan(edited(plan, {{0, R"({"command": "set_delay", "charge": 0, "delay": 0.2})"}}));
