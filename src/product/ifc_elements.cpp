@@ -166,8 +166,8 @@ class Reader {
   /// Coordinates that are no numbers would be zeros.
   /// What places and outlines refer to is there.
   void check_references() const {
-    static const std::set<std::string> checked{"IFCAXIS2PLACEMENT2D", "IFCAXIS2PLACEMENT3D",  "IFCPOLYLINE",
-                                               "IFCPOLYLOOP",         "IFCEXTRUDEDAREASOLID", "IFCINDEXEDPOLYCURVE"};
+    static const std::set<std::string> checked{"IFCAXIS2PLACEMENT2D", "IFCAXIS2PLACEMENT3D", "IFCPOLYLINE",
+                                               "IFCPOLYLOOP", "IFCINDEXEDPOLYCURVE"};
     for (const auto& [id, e] : file_.entities) {
       if (!checked.contains(e.type)) continue;
       const std::function<void(const StepValue&)> look = [&, n = id, &entity = e](const StepValue& v) {

@@ -196,6 +196,78 @@ TEST(ImportIfcBars, ThatAPlanCannotHoldAreGaps) {
   EXPECT_THAT(made.report.missing, Contains(HasSubstr("its 4 bars of 200 mm, which a plan cannot hold")));
 }
 
+/// A column with four bars of this grade.
+void add_reinforced(Writer& w, double x, const std::string& grade) {
+  (void)add_column(w, x, 0, x > 0 ? 0.5 : 0.4);
+  for (const double dx : {-0.15, 0.15})
+    for (const double y : {-0.15, 0.15})
+      w.add("IFCREINFORCINGBAR('g',$,'bar',$,$," + w.placement("$", x + dx, y, 0.1) + ",$,$,'" + grade +
+            "',0.02,0.0003,3.,.MAIN.,$)");
+}
+
+TEST(ImportIfcBars, HaveTheStrengthThatTheirGradeNames) {
+  const auto yield_of = [](const std::string& grade) {
+    Writer w;
+    w.metres();
+    add_reinforced(w, 0, grade);
+    const std::string text = import("IFC4", w).text;
+    const size_t at = text.find("fy = \"") + 6;
+    return text.substr(at, text.find('"', at) - at);
+  };
+  EXPECT_EQ(yield_of("B500B"), "500 N/mm2");
+  EXPECT_EQ(yield_of("DIN EN 10080:2005 B500B"), "500 N/mm2");
+  EXPECT_EQ(yield_of("EN 1992-1-1:2004 B500A"), "500 N/mm2");
+  EXPECT_EQ(yield_of("DIN 1045-1:2008 BSt 500 S"), "500 N/mm2");
+  EXPECT_EQ(yield_of("BSt 420/500 RK"), "420 N/mm2");
+  for (const char* none : {"60000 psi", "St 1570/1770", "Grade 420 ksi", "220 or 500", "?"})
+    EXPECT_EQ(yield_of(none), "?") << none;
+}
+
+TEST(ImportIfcBars, OfTwoGradesAreTwoSteels) {
+  Writer w;
+  w.metres();
+  add_reinforced(w, 0, "BSt 220");
+  add_reinforced(w, 6, "B500B");
+  const std::string text = import("IFC4", w).text;
+  EXPECT_THAT(text, HasSubstr("[steel.bars]\nfy = \"220 N/mm2\""));
+  EXPECT_THAT(text, HasSubstr("[steel.bars_2]\nfy = \"500 N/mm2\""));
+  EXPECT_THAT(text, HasSubstr("width = \"40 cm\"\nheight = \"40 cm\"\nconcrete = \"unknown\"\nsteel = \"bars\""));
+  EXPECT_THAT(text, HasSubstr("width = \"50 cm\"\nheight = \"50 cm\"\nconcrete = \"unknown\"\nsteel = \"bars_2\""));
+}
+
+TEST(ImportIfcProfiles, ThatAreRoundedOrPartOfThemselves) {
+  const auto width_of = [](const std::string& radius) {
+    Writer w;
+    w.metres();
+    const std::string profile = w.add("IFCROUNDEDRECTANGLEPROFILEDEF(.AREA.,$,$,0.3,0.3," + radius + ")");
+    w.element("IFCCOLUMN", w.placement("$", 0, 0, 0), w.shape("SweptSolid", w.extrusion(profile, 3)));
+    const std::string text = import("IFC4", w).text;
+    const size_t at = text.find("width = \"") + 9;
+    return text.substr(at, text.find('"', at) - at);
+  };
+  EXPECT_EQ(width_of("0.02"), "30 cm");
+  EXPECT_EQ(width_of("0.15"), "26.6 cm");  // a circle: as a square of its area
+  Writer w;
+  w.metres();
+  (void)add_column(w, 0, 0);
+  const std::string turn = w.add("IFCCARTESIANTRANSFORMATIONOPERATOR2D($,$," + w.point(0, 0, 0) + ",$)");
+  const std::string next = w.add("IFCDIRECTION((0.,0.,1.))");
+  const std::string own = "#" + std::to_string(std::stoi(next.substr(1)) + 1);
+  const std::string profile = w.add("IFCDERIVEDPROFILEDEF(.AREA.,$," + own + "," + turn + ",$)");
+  ASSERT_EQ(profile, own);
+  w.element("IFCCOLUMN", w.placement("$", 6, 0, 0), w.shape("SweptSolid", w.extrusion(profile, 3)));
+  EXPECT_THAT(import("IFC4", w).report.missing, Contains(HasSubstr("its profile is nested too deeply")));
+}
+
+TEST(ImportIfcReferences, ThatLeadNowhereAreRefused) {
+  Writer w;
+  w.metres();
+  const std::string at =
+      w.add("IFCLOCALPLACEMENT($," + w.add("IFCAXIS2PLACEMENT3D(" + w.point(0, 0, 0) + ",$,#99999)") + ")");
+  w.element("IFCCOLUMN", at, w.shape("SweptSolid", w.extrusion(w.rectangle(0.6, 0.3), 3)));
+  EXPECT_THAT(complaint([&] { (void)import("IFC4", w); }), HasSubstr("refers to #99999, which is not there"));
+}
+
 TEST(ImportDxfSizes, ThatAPlanCannotHoldAreLeftOutOrRefused) {
   const auto drawing = [](const std::string& outlines) {
     return "0\nSECTION\n2\nENTITIES\n" + outlines + "0\nENDSEC\n0\nEOF\n";
