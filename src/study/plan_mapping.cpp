@@ -164,19 +164,21 @@ void PlanMapping::check_firing(const product::Plan& plan, const Impl& impl) {
   const auto ends = [&](size_t i) {
     return std::array{inputs[i].corners.front().first, inputs[i].corners.back().first};
   };
+  const auto with = [&](size_t i, double end) { return product::text_of(inputs[i], end); };
   for (size_t i = 0; i < centre.size(); ++i)
     for (const double end : ends(i)) {
       std::vector<double> point = centre;
       point[i] = end;
-      const std::string with = " with " + product::text_of(inputs[i], end);
-      try_point(point, with, inputs[i].where);
-      for (size_t j = i + 1; j < centre.size(); ++j)
-        for (const double other : ends(j)) {
-          point[j] = other;
-          try_point(point, fmt::format("{} and {}", with, product::text_of(inputs[j], other)), inputs[i].where);
-          point[j] = centre[j];
-        }
+      try_point(point, " with " + with(i, end), inputs[i].where);
     }
+  for (size_t i = 0; i < centre.size(); ++i)
+    for (size_t j = i + 1; j < centre.size(); ++j)
+      for (const double end : ends(i))
+        for (const double other : ends(j)) {
+          std::vector<double> point = centre;
+          point[i] = end, point[j] = other;
+          try_point(point, fmt::format(" with {} and {}", with(i, end), with(j, other)), inputs[i].where);
+        }
 }
 
 PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k, PlanMappingOptions options) {

@@ -99,6 +99,7 @@ TEST(Compare, JudgesTheTiltUpToTheEarlierTouchdown) {
 TEST(Compare, OfARecordThatEndsEarlierSaysUpToWhen) {
   Record a = make_run("a", 0.25, 9, 1, 0, 1), b = make_run("b", 0.25, 3, 1, 0, 1);
   a.findings.push_back({"touchdown.first", "", "", "", 1.5, "s", Status::Info});
+  b.findings.push_back({"touchdown.first", "", "", "", std::nan(""), "s", Status::Info});
   a.events = {{1.5, "touchdown", "C-A1-0", ""}};
   const Comparison c = compare(a, b);
   EXPECT_THAT(describe(c, a, b), HasSubstr("of the upper block: A 1.50 s, B not up to 0.50 s."));
