@@ -95,7 +95,7 @@ template <class F>
 std::string take_free_name(const std::string& path, const F& take) {
   const std::filesystem::path wanted(path);
   for (int n = 1; n < 100000; ++n) {
-    const std::string name =
+    std::string name =
         n == 1
             ? path
             : (wanted.parent_path() / (wanted.stem().string() + "-" + std::to_string(n) + wanted.extension().string()))

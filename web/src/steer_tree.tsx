@@ -103,9 +103,16 @@ export function selectedMember(s: SteerState): string {
   return s.view.value?.run.bodies[s.selected.value]?.name ?? "";
 }
 
+/// Of a branch: its own pre-cuts, and those that the branches it comes from had when it left them.
+export function listCuts(branches: Branch[], branch: Branch): Branch["edits"] {
+  const own = branch.edits.filter((e) => e.kind.includes("cut"));
+  const parent = branches.find((b) => b.id === branch.parent);
+  return parent === undefined ? own : [...listCuts(branches, parent).filter((e) => e.time <= branch.time), ...own];
+}
+
 function Preparation(props: { s: SteerState; branch: Branch }) {
   const { s, branch } = props;
-  const cuts = branch.edits.filter((e) => e.kind.includes("cut"));
+  const cuts = listCuts(s.branches.value, branch);
   return (
     <>
       <details open>
