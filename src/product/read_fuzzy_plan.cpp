@@ -178,6 +178,18 @@ void FuzzyReader::read_entry(const Entry& entry, std::vector<std::string>& path)
     if (path.size() == targets[i].words.size()) found.push_back(i);
     leads_on = leads_on || path.size() < targets[i].words.size();
   }
+  for (size_t level = 0; level < path.size() && !found.empty(); ++level) {
+    if (path[level].find_first_of("*?") != std::string::npos) continue;
+    const auto is_place = [&](size_t t) { return targets[t].words[level].front() == path[level]; };
+    if (std::all_of(found.begin(), found.end(), is_place) || std::none_of(found.begin(), found.end(), is_place))
+      continue;
+    complaints.error("E203", entry.place,
+                     "fuzzy: " + quoted(join(path, ".")) + ": " + quoted(path[level]) +
+                         " is the place of one item and the name of another",
+                     "give the item another name");
+    path.pop_back();
+    return;
+  }
   const bool is_table = entry.value.kind == Node::Kind::Table;
   const bool says_how =
       is_table && (is_reading_random ? says_distribution(entry.value)

@@ -185,6 +185,17 @@ TEST(FuzzyPlan, ComplainsWhereTheFaultStands) {
   }
 }
 
+TEST(FuzzyPlan, APathThatIsOnesPlaceAndAnothersNameIsRefused) {
+  const std::string fuzzy = "[fuzzy]\nstage.1.charge.1.residual_bars = { triangular = [0, 0, 0.1] }\n";
+  std::vector<Diagnostic> warnings;
+  EXPECT_EQ(read_plan(with_fuzzy(fuzzy), "plan.toml", warnings).fuzzy.inputs.size(), 1U);
+  const std::string named = replaced(with_fuzzy(fuzzy), "time = \"2 s\"", "name = \"1\"\ntime = \"2 s\"");
+  const std::vector<Diagnostic> found = complaints_about(named);
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found.front().code, "E203");
+  EXPECT_THAT(found.front().message, testing::HasSubstr("\"1\" is the place of one item and the name of another"));
+}
+
 TEST(FuzzyPlan, TellsCornersThatAreNoPlan) {
   std::vector<Diagnostic> warnings;
   read(R"toml([fuzzy]
