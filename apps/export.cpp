@@ -53,10 +53,11 @@ int export_lsdyna(const Arguments& a) {
     const product::Plan plan = product::read_plan_file(a.input, warnings, text);
     print_diagnostics(warnings, text);
     collapse::ModelMap map;
-    const mbs::Model model = collapse::make_model(plan, load_knowledge(a), map, a.threads);
-    const farfield::Whole whole = farfield::make_whole(plan, load_knowledge(a), grid, model, map);
+    const collapse::Knowledge k = load_knowledge(a);
+    const mbs::Model model = collapse::make_model(plan, k, map, a.threads);
+    const farfield::Whole whole = farfield::make_whole(plan, k, grid, model, map);
     replace_file(a.output, farfield::to_lsdyna(plan, whole, map, until > 0 ? until : plan.analysis.duration,
-                                               load_knowledge(a).contact_body_friction));
+                                               k.contact_body_friction));
     for (const std::string& line : farfield::describe(farfield::calc_mesh_report(plan, whole)))
       std::printf("%s\n", line.c_str());
     std::printf("Wrote %s\n", a.output.c_str());

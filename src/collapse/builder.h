@@ -30,11 +30,6 @@ struct MemberStation {
   int damaged = -1;  // beside a fired charge; -1 if none is near
 };
 
-/// Whether a station is nearer than the other one, by more than round-off.
-inline bool is_nearer(double station, double other, double to) {
-  return std::abs(to - station) < std::abs(to - other) - 1e-9;
-}
-
 /// Columns and beams: what their force elements are made of.
 struct MemberZones {
   double clear_length = 0;  // between the faces of the joints [m]
@@ -45,6 +40,11 @@ struct MemberZones {
   int element[2] = {-1, -1};   // of each station; the same twice for a whole member
   int rotational = -1;         // of station 1 of a ground column
 };
+
+/// The station that is nearer to a place along the member [m]; the first one where both are as near, to round-off.
+inline int find_nearer_station(const MemberZones& z, double at) {
+  return std::abs(at - z.station[1].at) < std::abs(at - z.station[0].at) - 1e-9 ? 1 : 0;
+}
 
 /// Sectors of a shaft that hold together at a level, about their own centroid.
 struct ShaftElement {

@@ -161,9 +161,8 @@ void Builder::add_events(std::vector<Firing> schedule) {
     // a column that was not built with a stump leaves nothing below its charge
     if (m.kind == MemberKind::Column && !lowest_charge.count(c.member)) from = m.start[axis];
     const double to = m.start[axis] + c.position + 0.5 * c.destroyed_length;
-    int which = 0;
-    if (m.kind == MemberKind::Beam && is_nearer(z.station[1].at, z.station[0].at, c.position)) which = 1;
     const bool is_beam = m.kind == MemberKind::Beam;
+    int which = is_beam ? find_nearer_station(z, c.position) : 0;
     // a piece between a gap and a joint that is no longer than those that cut_member takes along
     const auto reaches = [&](int end) {
       return std::abs(c.position - z.station[static_cast<size_t>(end)].at) < 0.5 * c.destroyed_length + kSliver;

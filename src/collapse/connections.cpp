@@ -133,7 +133,6 @@ void Builder::request_station(int index, int which) {
   const product::Section& s = section_of(index);
   MemberZones& z = zones[index];
   MemberStation& station = z.station[static_cast<size_t>(which)];
-  const MemberStation& other = z.station[static_cast<size_t>(1 - which)];
   nearfield::ZoneInput in;
   in.section = s;
   in.concrete = concrete_of(s);
@@ -144,8 +143,7 @@ void Builder::request_station(int index, int which) {
     in.flange = find_flange(at, index);
   in.length = calc_zone_length(s, in.concrete, in.steel, depth, z.clear_length, k);
   for (const product::Weakening& w : m.weakenings) {
-    // the nearer station has it; the first one when both are as near
-    if (which == 0 ? is_nearer(other.at, station.at, w.at) : !is_nearer(station.at, other.at, w.at)) continue;
+    if (find_nearer_station(z, w.at) != which) continue;
     in.cut_bars = std::max(in.cut_bars, w.cut_bars);
     in.cut_concrete = std::max(in.cut_concrete, w.cut_concrete);
   }
@@ -155,8 +153,7 @@ void Builder::request_station(int index, int which) {
   for (const product::Stage& stage : plan.stages)
     for (const product::Charge& c : stage.charges) {
       if (c.member != index || c.fails || !(c.transition_damage > 0)) continue;
-      const bool acts_here =
-          is_column ? which == 0 : which == (is_nearer(z.station[1].at, z.station[0].at, c.position) ? 1 : 0);
+      const bool acts_here = which == (is_column ? 0 : find_nearer_station(z, c.position));
       const double gap = std::abs(c.position - station.at) - 0.5 * c.destroyed_length;
       if (acts_here || gap > k.charge_transition_reach * depth) continue;
       in.concrete_loss = std::max(in.concrete_loss, c.transition_damage);

@@ -10,7 +10,8 @@ namespace topple::farfield {
 
 /// Keyword file in kg, m, s (N, Pa, J), fields of the standard widths. A part for each member and material; what a
 /// charge destroys has parts of its own, whose material fails at the time of firing.
-///   duration  simulated after the dead load is in equilibrium [s]
+///   duration       simulated after the dead load is in equilibrium [s]
+///   body_friction  between parts [-]
 std::string to_lsdyna(const product::Plan&, const Whole&, const collapse::ModelMap&, double duration,
                       double body_friction);
 

@@ -228,21 +228,15 @@ void plane_solid(const Solid& plane, const Solid& other, bool flipped, BoxContac
   out.count = 0;
   const Vec3 n = plane.R.column(2);
   out.normal = flipped ? -n : n;
-  double lowest = std::numeric_limits<double>::infinity();
+  double lowest = std::numeric_limits<double>::infinity(), all = 0;
+  size_t below = 0;
   const auto take = [&](const Vec3& p, double weight) {
     const double height = dot(n, p - plane.p);
     lowest = std::min(lowest, height);
     if (height >= 0) return;
-    int at = out.count;
-    if (at == kMostPoints) {
-      // the deepest ones count
-      at = 0;
-      for (int i = 1; i < kMostPoints; ++i)
-        if (out.depth[i] < out.depth[at]) at = i;
-      if (-height <= out.depth[at]) return;
-    } else {
-      ++out.count;
-    }
+    ++below, all += weight;
+    if (out.count == kMostPoints) return;
+    const int at = out.count++;
     out.p[at] = p;
     out.depth[at] = -height;
     out.weight[at] = weight;
@@ -257,23 +251,19 @@ void plane_solid(const Solid& plane, const Solid& other, bool flipped, BoxContac
   } else {
     const Hull& hull = *other.hull;
     const auto place = [&](size_t i) { return other.p + other.R * hull.vertices[i]; };
-    size_t below = 0;
-    double weight = 0;
-    for (size_t i = 0; i < hull.vertices.size(); ++i)
-      if (dot(n, place(i) - plane.p) < 0) ++below, weight += hull.weights[i];
-    if (below <= static_cast<size_t>(kMostPoints)) {
-      for (size_t i = 0; i < hull.vertices.size(); ++i) take(place(i), hull.weights[i]);
-    } else {
+    for (size_t i = 0; i < hull.vertices.size(); ++i) take(place(i), hull.weights[i]);
+    if (const size_t most = kMostPoints, count = below; count > most) {
       // spread over all of them, with the weight of those left out
+      const double whole = all;
       size_t seen = 0;
-      double taken = 0;
+      out.count = 0, all = 0;
       for (size_t i = 0; i < hull.vertices.size(); ++i) {
         const Vec3 p = place(i);
         if (!(dot(n, p - plane.p) < 0)) continue;
-        const size_t before = seen * kMostPoints / below, after = ++seen * kMostPoints / below;
-        if (after > before) take(p, hull.weights[i]), taken += hull.weights[i];
+        const size_t before = seen * most / count, after = ++seen * most / count;
+        if (after > before) take(p, hull.weights[i]);
       }
-      for (int i = 0; i < out.count; ++i) out.weight[i] *= weight / taken;
+      for (int i = 0; i < out.count; ++i) out.weight[i] *= whole / all;
     }
   }
   out.gap = std::max(0.0, lowest);

@@ -466,18 +466,15 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
   PackedSection packed = pack_section(f);
   double eps_0 = 0;
   Resultants r;
-  const bool is_found = find(packed, search, 0, eps_0, r);
+  bool is_found = find(packed, search, 0, eps_0, r);
   // not found, or not before the first hill that there may be
   if (N < 0 && has_concrete(f) && !(is_found && eps_0 > -0.9 * std::min(f.cover.eps_c1, f.core.eps_c1))) {
     double first = 0;
     Resultants there;
     if (find_evenly(packed, search, f.cover.eps_c1, first, there) && (!is_found || first > eps_0 + 1e-9))
-      eps_0 = first, r = there;
-    else if (!is_found)
-      return out;
-  } else if (!is_found) {
-    return out;
+      eps_0 = first, r = there, is_found = true;
   }
+  if (!is_found) return out;
 
   // An unsymmetric section bends under N alone: start where M = 0, or at no curvature if it carries N with a moment
   // only.

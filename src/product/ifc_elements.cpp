@@ -163,8 +163,7 @@ class Reader {
     for (const int id : ids) ++out_.others[without_case(file_.find(id)->type)];
   }
 
-  /// Coordinates that are no numbers would be zeros.
-  /// What places and outlines refer to is there.
+  /// What places and outlines refer to is there; what is not would be zeros.
   void check_references() const {
     static const std::set<std::string> checked{"IFCAXIS2PLACEMENT2D", "IFCAXIS2PLACEMENT3D", "IFCPOLYLINE",
                                                "IFCPOLYLOOP", "IFCINDEXEDPOLYCURVE"};
@@ -183,6 +182,7 @@ class Reader {
       for (const StepValue& v : e.arguments) look(v);
     }
   }
+  /// Coordinates that are no numbers would be zeros.
   void check_coordinates() const {
     const auto is_tuple = [](const StepValue& v, size_t least) {
       return v.kind == Kind::List && v.items.size() >= least && v.items.size() <= 3 &&

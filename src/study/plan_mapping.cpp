@@ -150,6 +150,11 @@ void PlanMapping::check_firing(const product::Plan& plan, const Impl& impl) {
       }
   };
   check(plan, "", {plan.path, 0, 0});
+  // no sample fires at other times than the plan does
+  const auto is_of_a_stage = [](const product::DocumentPath& p) { return !p.empty() && p.front().key == "stage"; };
+  if (std::none_of(plan.fuzzy.places.begin(), plan.fuzzy.places.end(),
+                   [&](const auto& places) { return std::any_of(places.begin(), places.end(), is_of_a_stage); }))
+    return;
   const std::vector<double> centre = product::calc_centre(plan.fuzzy);
   const std::vector<product::FuzzyValue>& inputs = plan.fuzzy.inputs;
   const auto try_point = [&](const std::vector<double>& point, const std::string& with, const SourcePosition& where) {
