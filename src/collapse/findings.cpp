@@ -11,6 +11,7 @@
 
 #include "base/interpolate.h"
 #include "base/unit.h"
+#include "base/words.h"
 #include "collapse/debris.h"
 #include "collapse/heads_across.h"
 #include "collapse/outcome.h"
@@ -717,26 +718,27 @@ void add_rigid_block(const Context& c) {
   record::Series series{"tilt_angle_rigid_block", "Tilt angle of a rigid block", "rad", "angle",
                         calc_rigid_block(block, c.r.time)};
   const double when = block.release + 1;
-  const double tons = block.mass / unit::t, moment = block.plastic_moment * 1e-6;  // [t, MNm]
+  const std::string tons = decimal_words(block.mass / unit::t, 0),
+                    moment = decimal_words(block.plastic_moment * 1e-6, 2);  // [t, MNm]
   // literals as wholes, as they are translated
   const auto words = [&]() -> std::string {
     const double way = std::abs(block.ahead);
     if (row.size() == 1 && block.ahead < 0)
       return fmt::format(
-          "a rigid block in its place ({:.0f} t on a plastic hinge of {:.2f} MNm, its mass centre {:.2f} m behind it)",
-          tons, moment, way);
+          "a rigid block in its place ({} t on a plastic hinge of {} MNm, its mass centre {:.2f} m behind it)", tons,
+          moment, way);
     if (row.size() == 1)
       return fmt::format(
-          "a rigid block in its place ({:.0f} t on a plastic hinge of {:.2f} MNm, its mass centre {:.2f} m ahead of "
+          "a rigid block in its place ({} t on a plastic hinge of {} MNm, its mass centre {:.2f} m ahead of "
           "it)",
           tons, moment, way);
     if (block.ahead < 0)
       return fmt::format(
-          "a rigid block in its place ({:.0f} t on {} plastic hinges of {:.2f} MNm in all, its mass centre {:.2f} m "
+          "a rigid block in its place ({} t on {} plastic hinges of {} MNm in all, its mass centre {:.2f} m "
           "behind them)",
           tons, row.size(), moment, way);
     return fmt::format(
-        "a rigid block in its place ({:.0f} t on {} plastic hinges of {:.2f} MNm in all, its mass centre {:.2f} m "
+        "a rigid block in its place ({} t on {} plastic hinges of {} MNm in all, its mass centre {:.2f} m "
         "ahead of them)",
         tons, row.size(), moment, way);
   };

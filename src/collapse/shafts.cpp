@@ -9,6 +9,7 @@
 
 #include "base/interpolate.h"
 #include "base/unit.h"
+#include "base/words.h"
 #include "collapse/builder.h"
 #include "nearfield/shell.h"
 
@@ -524,11 +525,11 @@ void Builder::note_mouth(const Member& m, const Shaft& s, const ShaftModel& shaf
   const double towards = std::abs(std::round(wrap(way + 1e-9) / unit::deg));
   map.notes.push_back(
       {"The mouth of " + m.name,
-       fmt::format(
-           "The mouth of {} at {:.1f} m leaves {:.0f} deg of the ring. The weight of {:.2f} MN above it turns "
-           "with {:.2f} MNm towards {:.0f} deg about the centroid of what is left, {:.2f} m off the axis, which "
-           "resists with {:.2f} MNm at most: it {}.",
-           m.name, joint.at, degrees, stays * 1e-6, moment * 1e-6, towards, off, tipping.most() * 1e-6, verdict)});
+       fmt::format("The mouth of {} at {:.1f} m leaves {:.0f} deg of the ring. The weight of {} MN above it turns "
+                   "with {} MNm towards {:.0f} deg about the centroid of what is left, {:.2f} m off the axis, which "
+                   "resists with {} MNm at most: it {}.",
+                   m.name, joint.at, degrees, decimal_words(stays * 1e-6, 2), decimal_words(moment * 1e-6, 2), towards,
+                   off, decimal_words(tipping.most() * 1e-6, 2), verdict)});
 }
 
 const product::Charge& Builder::charge_of(const ShaftElement& e) const {

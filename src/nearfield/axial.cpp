@@ -10,7 +10,10 @@ namespace topple::nearfield {
 AxialCurve make_compression(const Fibres& f, const Peak& peak, double EA, double length) {
   const PackedSection packed = pack_section(f);
   const auto force = [&](double e) { return std::max(0.0, -calc_resultants(packed, -e, 0).N); };
+  const std::vector<Peak> hills = find_hills_before(f, peak);
   double low = 0, high = peak.strain;
+  for (const Peak& hill : hills)
+    if (hill.force >= 0.75 * peak.force) high = std::min(high, hill.strain);
   for (int i = 0; i < 50; ++i) {
     const double e = 0.5 * (low + high);
     (force(e) < 0.75 * peak.force ? low : high) = e;
@@ -23,7 +26,14 @@ AxialCurve make_compression(const Fibres& f, const Peak& peak, double EA, double
     out.displacement.push_back(out.displacement.empty() ? 0 : u);
     out.force.push_back(F);
   };
-  for (int i = 0; i <= 5; ++i) add(start + (peak.strain - start) * i / 5.0);
+  double from = start;
+  const auto climb = [&](double to) {
+    for (int i = from == start ? 0 : 1; i <= 5; ++i) add(from + (to - from) * i / 5.0);
+    from = to;
+  };
+  for (const Peak& hill : hills)
+    if (hill.strain > start) climb(hill.strain);
+  climb(peak.strain);
   constexpr int points = 28;
   double x = 0.15 * peak.strain;
   const double ratio = std::pow(std::max(1.01, (1 - peak.strain) / x), 1.0 / (points - 1));

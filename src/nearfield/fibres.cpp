@@ -379,6 +379,8 @@ bool find(const PackedSection& f, const Search& search, double kappa, double& ep
   return accept();
 }
 
+constexpr double kBracket = 1.15;  // ratio of the strains between which a hill is looked for
+
 /// The strain and the force of the hill of a compression between two strains, by golden section.
 ///   force  at a compressive strain
 template <typename F>
@@ -421,6 +423,14 @@ bool find_evenly(const PackedSection& f, const Search& search, double eps_c1, do
   return false;
 }
 
+/// Strains at which the force may have a sharp hill.
+std::vector<double> list_bends(const Fibres& f) {
+  std::vector<double> bends{f.cover.eps_c1, f.core.eps_c1};
+  for (const material::Steel& law : f.bar_law) bends.push_back(law.eps_y);
+  std::erase_if(bends, [](double bend) { return !(bend > 0); });
+  return bends;
+}
+
 }  // namespace
 
 bool find_equilibrium(const Fibres& f, double N, double kappa, double& eps_0, const BarStates& bars) {
@@ -440,23 +450,43 @@ Peak find_crushing(const Fibres& f) {
   const PackedSection packed = pack_section(f);
   const auto force = [&](double e) { return -calc_resultants(packed, -e, 0).N; };
   Peak best;
-  constexpr double ratio = 1.15;
-  for (double e = 1e-5; e < 0.3; e *= ratio)
+  for (double e = 1e-5; e < 0.3; e *= kBracket)
     if (const double F = force(e); F > best.force) best = {F, e};
   if (best.strain <= 0) return {};
-  if (const Peak top = find_top(best.strain / ratio, best.strain * ratio, force); top.force > best.force) best = top;
+  if (const Peak top = find_top(best.strain / kBracket, best.strain * kBracket, force); top.force > best.force)
+    best = top;
   const auto take = [&best](const Peak& p) {
     if (p.force > best.force * (1 + 1e-9)) best = p;
   };
   // the sharp hill of the cover or of the bars may lie between two strains of the grid
-  std::vector<double> bends{f.cover.eps_c1, f.core.eps_c1};
-  for (const material::Steel& law : f.bar_law) bends.push_back(law.eps_y);
-  for (const double bend : bends) {
-    if (!(bend > 0)) continue;
+  for (const double bend : list_bends(f)) {
     take({force(bend), bend});
-    take(find_top(bend / ratio, bend * ratio, force));
+    take(find_top(bend / kBracket, bend * kBracket, force));
   }
   return best;
+}
+
+std::vector<Peak> find_hills_before(const Fibres& f, const Peak& crushing) {
+  const PackedSection packed = pack_section(f);
+  const auto force = [&](double e) { return -calc_resultants(packed, -e, 0).N; };
+  const auto is_top = [&](const Peak& p) {
+    return force(p.strain * (1 - 1e-3)) < p.force && force(p.strain * (1 + 1e-3)) < p.force;
+  };
+  std::vector<Peak> tops;
+  for (const double bend : list_bends(f)) {
+    for (const Peak& top : {Peak{force(bend), bend}, find_top(bend / kBracket, bend * kBracket, force)})
+      if (top.strain < crushing.strain * (1 - 1e-2) && is_top(top)) tops.push_back(top);
+  }
+  std::sort(tops.begin(), tops.end(), [](const Peak& a, const Peak& b) { return a.strain < b.strain; });
+  tops.push_back(crushing);
+  std::vector<Peak> out;
+  for (std::size_t i = 0; i + 1 < tops.size(); ++i) {
+    if (tops[i + 1].strain < tops[i].strain * (1 + 1e-2)) continue;  // the same hill
+    const Peak low = find_top(tops[i].strain, tops[i + 1].strain, [&](double e) { return -force(e); });
+    out.push_back(tops[i]);
+    out.push_back({-low.force, low.strain});
+  }
+  return out;
 }
 
 March march_curvature(const Fibres& f, double N, int direction, const std::vector<double>& kappa) {

@@ -75,6 +75,9 @@ struct Peak {
   double force = 0, strain = 0;
 };
 Peak find_crushing(const Fibres&);
+/// Where the force is largest and smallest on the way to the crushing, in turn, by strain: the sharp hill of a cover
+/// that comes off before a strongly tied core bears more, and the valley behind it. Most sections have none.
+std::vector<Peak> find_hills_before(const Fibres&, const Peak& crushing);
 
 /// Concrete of the zone after losses, before regularisation. The factor of the strength lies in (0, 1].
 material::ConcreteInput make_concrete_input(const ZoneInput&);

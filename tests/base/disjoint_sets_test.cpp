@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "base/words.h"
-
 namespace topple {
 namespace {
 
@@ -26,12 +24,6 @@ TEST(DisjointSets, TheLowestLeadsInAnyOrder) {
     }
     for (int i = 0; i < 5; ++i) EXPECT_EQ(s.find(i), 0) << i;
   }
-}
-
-TEST(Words, CountOneAndMany) {
-  EXPECT_EQ(count_words(1, "row"), "1 row");
-  EXPECT_EQ(count_words(0, "row"), "0 rows");
-  EXPECT_EQ(count_words(2, "thickness"), "2 thicknesses");
 }
 
 }  // namespace

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 
+#include "base/interpolate.h"
 #include "base/unit.h"
+#include "nearfield/axial.h"
 
 namespace topple::nearfield {
 namespace {
@@ -235,6 +237,31 @@ TEST(FibresPhysics, CrushingIsTheLargestForceOfAnyStrain) {
     EXPECT_GE(find_crushing(f).force, most * (1 - 1e-9)) << fc;
     EXPECT_LE(find_crushing(f).force, most * (1 + 1e-4)) << fc;
   }
+}
+
+TEST(FibresPhysics, ThePlasticShorteningPassesTheCoversHillToo) {
+  ZoneInput in = make_tied(400 * mm, 90 * MPa, 44e3 * MPa, 2.8e-3, 39e3, 500 * MPa, 45 * mm, 4, 20 * mm);
+  in.section.tie_diameter = 16 * mm, in.section.tie_spacing = 60 * mm;
+  in.section.tie_legs_y = in.section.tie_legs_z = 8;
+  const Fibres f = make_fibres(in, Axis::Y);
+  const Peak crushing = find_crushing(f);
+  const auto force = [&](double e) { return -calc_resultants(f, -e, 0).N; };
+  double first = 1e-4;  // the strain of the first hill
+  while (force(first + 1e-6) > force(first)) first += 1e-6;
+  ASSERT_LT(first, 0.3 * crushing.strain);
+  ASSERT_GT(force(first), 0.9 * crushing.force);
+
+  const double EA = calc_resultants(f, 0, 0).dN, length = 0.3;
+  const AxialCurve curve = make_compression(f, crushing, EA, length);
+  double begin = 0;  // where the force has three quarters of the crushing for the first time
+  while (force(begin) < 0.75 * crushing.force) begin += 1e-7;
+  const double offset = begin - force(begin) / EA;
+  for (double e = begin; e < crushing.strain; e += 1e-5) {
+    const double u = length * (e - force(e) / EA - offset);
+    EXPECT_NEAR(interpolate(curve.displacement, curve.force, u), force(e), 0.02 * crushing.force) << e;
+  }
+  EXPECT_NEAR(interpolate(curve.displacement, curve.force, length * (first - force(first) / EA - offset)), force(first),
+              1e-4 * crushing.force);
 }
 
 TEST(FibresPhysics, PeakAndEnergyDoNotDependOnTheLayers) {

@@ -5,7 +5,7 @@ import { say } from "../translate";
 import { makePath, makeScale, makeTicks, tickText } from "./chart";
 import { titleOf, type Maybe } from "./data";
 import { height as titleHeight, layTitles } from "./labels";
-import { lookOf, nameOf, type Axis, type State } from "./state";
+import { isClassed, lookOf, nameOf, type Axis, type State } from "./state";
 import { OutcomeName } from "./verdict";
 
 const high = 272, bottom = 24, side = 60; // of the lines, below them, beside them
@@ -244,7 +244,7 @@ function OneRun(props: { state: State; digits: Digits }) {
   ];
   return (
     <div class="one-run" id="run" data-test="run">
-      <h3>Run {sample}: <OutcomeName study={study} index={table.outcome[r] as number} /></h3>
+      <h3>Run {sample}{isClassed(study) && <>: <OutcomeName study={study} index={table.outcome[r] as number} /></>}</h3>
       {failure !== undefined && <p>{failure}</p>}
       <table class="pairs">
         <tbody>{pairs.map(([key, value]) => <tr><th scope="row">{key}</th><td>{value}</td></tr>)}</tbody>
@@ -289,7 +289,7 @@ export function Runs(props: { state: State }) {
             <thead>
               <tr>
                 <th scope="col">run</th>
-                <th scope="col">outcome</th>
+                {isClassed(study) && <th scope="col">outcome</th>}
                 <th scope="col">possibility</th>
                 {study.inputs.map((q) => <th scope="col">{titleOf({ name: q.label, unit: q.unit })}</th>)}
                 {study.outputs.slice(0, 3).map((q) => <th scope="col">{titleOf(q)}</th>)}
@@ -299,7 +299,7 @@ export function Runs(props: { state: State }) {
               {shown.map((r) => (
                 <tr class={r === state.selected.value ? "selected" : ""}>
                   <td><button type="button" class="link" data-run={table.sample[r]} onClick={() => (state.selected.value = r)}>{table.sample[r]}</button></td>
-                  <td class="name">{nameOf(study.outcomes[table.outcome[r] as number] ?? { name: "?", is_failure: false, runs: 0, possibility: 0, necessity: 0, outputs: [] })}</td>
+                  {isClassed(study) && <td class="name">{nameOf(study.outcomes[table.outcome[r] as number] ?? { name: "?", is_failure: false, runs: 0, possibility: 0, necessity: 0, outputs: [] })}</td>}
                   <td>{formatNumber(table.membership[r], 3)}</td>
                   {study.inputs.map((_, k) => <td>{formatNumber(table.inputs[r]?.[k], digits.inputs[k])}</td>)}
                   {study.outputs.slice(0, 3).map((_, k) => <td>{formatNumber(table.outputs[r]?.[k], digits.outputs[k])}</td>)}

@@ -16,6 +16,8 @@ export function lookOf(outcomes: readonly Outcome[], index: number): Look {
   return { colour: `var(--series-${i % seriesColours.length})`, dash: dashOfSeries(i), shape: shapes[i % shapes.length] as string };
 }
 export const nameOf = (outcome: Outcome): string => outcome.name || "(no name)";
+/// Whether runs fall into outcomes: a model that names none has one for all of them, which tells nothing.
+export const isClassed = (study: Study): boolean => study.outcomes.some((o) => o.name !== "");
 
 export interface Axis {
   id: string;

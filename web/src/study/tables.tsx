@@ -1,6 +1,6 @@
 import { digitsWithin, formatDate, formatNumber, prettify } from "../units";
 import { isKnown, titleOf, type Driver, type Study } from "./data";
-import type { State } from "./state";
+import { isClassed, type State } from "./state";
 import { OutcomeName } from "./verdict";
 import { say } from "../translate";
 
@@ -61,7 +61,7 @@ export function Drivers(props: { state: State }) {
           </div>
         </>
       )}
-      {study.known.length > 0 && (
+      {study.known.length > 0 && isClassed(study) && (
         <>
           <h3>If one input were known</h3>
           <p class="quiet">Possibility of each outcome with all inputs fuzzy, and with one of them fixed at the middle of its core. At least so much was found.</p>

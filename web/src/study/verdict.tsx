@@ -1,7 +1,7 @@
 import { Sign, StatusSign, StatusWord } from "../signs";
 import { atLeast, atMost, formatDate, prettify } from "../units";
 import type { Study } from "./data";
-import { lookOf, nameOf, type State } from "./state";
+import { isClassed, lookOf, nameOf, type State } from "./state";
 
 export function Header(props: { study: Study }) {
   const { study } = props;
@@ -123,8 +123,8 @@ export function Requirement(props: { state: State }) {
 /// How possible and how necessary each outcome is.
 export function Outcomes(props: { state: State }) {
   const { study } = props.state;
-  if (study.outcomes.length === 0) return null;
   const unmet = study.not_met ?? [];
+  if (!isClassed(study) && unmet.length === 0) return null;
   return (
     <section class="panel" aria-label="Outcomes">
       <h2>Outcomes</h2>
