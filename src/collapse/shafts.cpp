@@ -70,12 +70,39 @@ double wrap(double angle) {
   return a < 0 ? a + 2 * kPi : a;
 }
 
+/// Of a charge or a cut.
+struct Sector {
+  double at = 0, middle = 0, opening = 0;  // above the foot [m]; in W [rad]
+};
+
+/// The angle below which what is left of a ring between two charges or cuts bears nothing [rad].
+double find_sliver(const Shaft& s, double share) {
+  constexpr double kMost = kPi / 180, kOfThickness = 0.5;
+  const double t = s.thickness(share);
+  return std::min(kMost, kOfThickness * t / (s.outer(share) - 0.5 * t));
+}
+
+/// Slivers between sectors of a level go to both of their sides by half.
+void close_slivers(std::vector<Sector>& sectors, const Shaft& s, double height) {
+  const std::vector<Sector> as_given = sectors;
+  for (size_t i = 0; i < sectors.size(); ++i)
+    for (size_t j = 0; j < sectors.size(); ++j) {
+      const Sector &a = as_given[i], &b = as_given[j];
+      if (i == j || std::abs(a.at - b.at) > kSameLevel) continue;
+      if (product::is_all_around(a.opening) || product::is_all_around(b.opening)) continue;
+      const double gap = wrap(b.middle - 0.5 * b.opening - a.middle - 0.5 * a.opening);
+      if (gap >= find_sliver(s, a.at / height)) continue;
+      sectors[i].middle += 0.25 * gap, sectors[i].opening += 0.5 * gap;
+      sectors[j].middle -= 0.25 * gap, sectors[j].opening += 0.5 * gap;
+    }
+}
+
 /// Edges of the sectors of charges and cuts, from 0 to 2 pi, each once; angles count from `azimuth`.
-std::vector<double> find_edges(const std::vector<std::pair<double, double>>& sectors, double azimuth) {
+std::vector<double> find_edges(const std::vector<Sector>& sectors, double azimuth) {
   std::vector<double> edges;
-  for (const auto& [middle, opening] : sectors) {
-    if (product::is_all_around(opening)) continue;
-    for (const double side : {-0.5, 0.5}) edges.push_back(wrap(middle + side * opening - azimuth));
+  for (const Sector& s : sectors) {
+    if (product::is_all_around(s.opening)) continue;
+    for (const double side : {-0.5, 0.5}) edges.push_back(wrap(s.middle + side * s.opening - azimuth));
   }
   std::sort(edges.begin(), edges.end());
   edges.erase(std::unique(edges.begin(), edges.end(), [](double a, double b) { return b - a < 1e-6; }), edges.end());
@@ -85,7 +112,7 @@ std::vector<double> find_edges(const std::vector<std::pair<double, double>>& sec
 
 /// Sectors of a shaft's charges, middle and opening; those that touch and act as one (at a level, in a stage, after a
 /// delay, of one height) as one.
-std::vector<std::pair<double, double>> find_mouths(const product::Plan& plan, int index) {
+std::vector<Sector> find_mouths(const product::Plan& plan, const std::vector<Sector>& sectors, int index) {
   struct Mouth {
     std::tuple<size_t, double, double, double, bool> alike;
     double middle = 0, opening = 0;
@@ -93,8 +120,10 @@ std::vector<std::pair<double, double>> find_mouths(const product::Plan& plan, in
   std::vector<Mouth> mouths;
   for (size_t stage = 0; stage < plan.stages.size(); ++stage)
     for (const product::Charge& c : plan.stages[stage].charges)
-      if (c.member == index)
-        mouths.push_back({{stage, c.delay, c.position, c.destroyed_length, c.fails}, c.azimuth, c.opening});
+      if (c.member == index) {
+        const Sector& s = sectors[mouths.size()];
+        mouths.push_back({{stage, c.delay, c.position, c.destroyed_length, c.fails}, s.middle, s.opening});
+      }
   const auto join = [&mouths](size_t i, size_t j) {
     Mouth& a = mouths[i];
     const Mouth& b = mouths[j];
@@ -112,8 +141,8 @@ std::vector<std::pair<double, double>> find_mouths(const product::Plan& plan, in
     for (size_t i = 0; i < mouths.size() && !has_joined; ++i)
       for (size_t j = i + 1; j < mouths.size() && !has_joined; ++j) has_joined = join(i, j);
   }
-  std::vector<std::pair<double, double>> out;
-  for (const Mouth& m : mouths) out.emplace_back(m.middle, m.opening);
+  std::vector<Sector> out;
+  for (const Mouth& m : mouths) out.push_back({std::get<2>(m.alike), m.middle, m.opening});
   return out;
 }
 
@@ -194,18 +223,20 @@ bool comes_to_a_stop(const Tipping& t, double moment, double growth, double stif
 }  // namespace
 
 std::optional<MouthLeft> find_mouth_left(const product::Plan& plan, int member, double at) {
-  std::vector<std::pair<double, double>> sectors;
+  std::vector<Sector> sectors;
   for (const product::Stage& s : plan.stages)
     for (const product::Charge& c : s.charges)
       if (c.member == member && !c.fails && std::abs(c.position - at) < kSameLevel)
-        sectors.emplace_back(c.azimuth, c.opening);
+        sectors.push_back({at, c.azimuth, c.opening});
   if (sectors.empty()) return std::nullopt;
+  const Member& m = plan.members[static_cast<size_t>(member)];
+  close_slivers(sectors, plan.shafts[static_cast<size_t>(m.shaft)], m.end.z - m.start.z);
   MouthLeft out;
   double x = 0, y = 0;
   const std::vector<double> edges = find_edges(sectors, 0);
   for (size_t i = 0; i < edges.size(); ++i) {
     const double from = edges[i], to = i + 1 < edges.size() ? edges[i + 1] : edges.front() + 2 * kPi;
-    const auto is_out = [&](const auto& s) { return product::is_in_sector(0.5 * (from + to), s.first, s.second); };
+    const auto is_out = [&](const auto& s) { return product::is_in_sector(0.5 * (from + to), s.middle, s.opening); };
     if (std::any_of(sectors.begin(), sectors.end(), is_out)) continue;
     out.angle += to - from;
     x += std::sin(to) - std::sin(from), y += std::cos(from) - std::cos(to);
@@ -221,11 +252,13 @@ void Builder::make_shaft(int index) {
   const double H = m.end.z - m.start.z;
   ShaftModel& shaft = shafts[index];
   shaft.azimuth = std::atan2(map.fall_direction.y, map.fall_direction.x);
-  std::vector<std::pair<double, double>> sectors;  // middle and opening, in W
+  std::vector<Sector> sectors;  // of charges as the plan has them, then of cuts
   for (const product::Stage& stage : plan.stages)
     for (const product::Charge& c : stage.charges)
-      if (c.member == index) sectors.emplace_back(c.azimuth, c.opening);
-  for (const product::Weakening& w : m.weakenings) sectors.emplace_back(w.azimuth, w.opening);
+      if (c.member == index) sectors.push_back({c.position, c.azimuth, c.opening});
+  const size_t charges = sectors.size();
+  for (const product::Weakening& w : m.weakenings) sectors.push_back({w.at, w.azimuth, w.opening});
+  close_slivers(sectors, s, H);
 
   // levels: the foot or a mouth above a rigid stump, other mouths and cuts, and between them as far apart as wanted
   const std::vector<Level> levels = find_levels(plan, index);
@@ -270,8 +303,8 @@ void Builder::make_shaft(int index) {
   // staves between the edges of mouths and cuts, the same at every height
   std::vector<double> bounds;
   const std::vector<double> edges = find_edges(sectors, shaft.azimuth);
-  std::vector<std::pair<double, double>> mouths = find_mouths(plan, index);
-  for (const product::Weakening& w : m.weakenings) mouths.emplace_back(w.azimuth, w.opening);
+  std::vector<Sector> mouths = find_mouths(plan, sectors, index);
+  mouths.insert(mouths.end(), sectors.begin() + static_cast<std::ptrdiff_t>(charges), sectors.end());
   const std::vector<double> ends = find_edges(mouths, shaft.azimuth);
   if (ends.empty()) {
     for (int i = 0; i <= kLeastStaves; ++i) bounds.push_back((i - 0.5) * 2 * kPi / kLeastStaves);
@@ -431,7 +464,7 @@ void Builder::connect_shaft(int index) {
       const nearfield::Rcc rcc = nearfield::make_ring_rcc(e.ring);
       const double N = -weight * e.whole.EA / EA, l = joint.length;
       // a closed ring bends alike about all axes
-      const double EI_z = rcc.calc_EI_effective_z(N), EI_y = e.whole.is_closed ? EI_z : rcc.calc_EI_effective_y(N);
+      const double EI_z = rcc.calc_EI_effective_z(N), EI_y = e.ring.sectors.empty() ? EI_z : rcc.calc_EI_effective_y(N);
       std::string name = fmt::format("{}/{:.1f}m", m.name, joint.at);
       if (e.charge >= 0) name += number++ > 0 ? fmt::format("/mouth{}", number) : "/mouth";
       mbs::ZoneLaw law = make_zone_law(rcc, EI_y, EI_z, name, k);

@@ -88,6 +88,9 @@ void check_ring(const RingInput& in) {
   if (sum > 2 * pi + 1e-6) complain("the sectors are more than a ring");
 }
 
+/// Whether the ring is the same all around, whole or cut.
+bool is_even(const RingInput& in) { return sectors_of(in).size() == 1 && sectors_of(in)[0].angle() > 2 * pi - 1e-6; }
+
 /// Whether every sector has its mirror image about the y axis.
 bool is_symmetric(const RingInput& in) {
   for (const RingSector& s : sectors_of(in)) {
@@ -144,10 +147,13 @@ void add_shear(const RingInput& in, const RingProperties& p, Rcc& out) {
   out.shear_y = out.shear_z = shear;
   out.shear_friction = p.area > 0 ? 0.6 : 0;
   const double G = c.Ec / 2.4, along = share * 2 * pi * mean;
-  out.torsion = p.is_closed ? c.fct * 2 * pi * mean * mean * t : c.fct * along * t * t / 3;
+  double least = 1, slack = 0;  // share of the concrete, and what the shear flow of a closed ring turns
+  for (const RingSector& s : sectors_of(in)) least = std::min(least, s.concrete), slack += s.angle() / s.concrete;
+  slack /= 2 * pi;
+  out.torsion = p.is_closed ? c.fct * 2 * pi * mean * mean * t * least : c.fct * along * t * t / 3;
   out.torsion = std::max(out.torsion, 1e-6 * out.EA * t);
   out.GA = 0.5 * G * p.area;
-  out.GJ = 0.2 * G * (p.is_closed ? 2 * pi * mean * mean * mean * t : along * t * t * t / 3);
+  out.GJ = 0.2 * G * (p.is_closed ? 2 * pi * mean * mean * mean * t / slack : along * t * t * t / 3);
 }
 
 }  // namespace
@@ -280,23 +286,22 @@ Rcc make_ring_rcc(const RingInput& given) {
   ZoneInput zone = plain_zone(in);
   const std::vector<double> rotation_z = make_rotations(zone, z_pos.half_depth + z_neg.half_depth, z_pos.cover);
   out.z_pos = make_family(z_pos, -1, force, rotation_z, in.length);
-  if (p.is_closed && given.sectors.empty()) {
+  if (is_even(given)) {
     out.z_neg = out.y_pos = out.y_neg = out.z_pos;
   } else {
     out.z_neg = make_family(z_neg, 1, force, rotation_z, in.length);
     const Fibres y_pos = make_ring_fibres(in, Axis::Y, 1, p.y, p.z);
-    const std::vector<double> rotation_y = make_rotations(zone, 2 * y_pos.half_depth, y_pos.cover);
+    const Fibres y_neg = is_symmetric(in) ? y_pos : make_ring_fibres(in, Axis::Y, -1, p.y, p.z);
+    const std::vector<double> rotation_y = make_rotations(zone, y_pos.half_depth + y_neg.half_depth, y_pos.cover);
     out.y_pos = make_family(y_pos, 1, force, rotation_y, in.length);
-    out.y_neg = is_symmetric(in)
-                    ? out.y_pos
-                    : make_family(make_ring_fibres(in, Axis::Y, -1, p.y, p.z), -1, force, rotation_y, in.length);
+    out.y_neg = is_symmetric(in) ? out.y_pos : make_family(y_neg, -1, force, rotation_y, in.length);
   }
   for (MomentFamily* f : {&out.y_pos, &out.y_neg, &out.z_pos, &out.z_neg}) {
     keep_bearing(*f);
     f->elongation.clear();  // not that of a band that moves back
   }
   add_shear(in, p, out);
-  out.biaxial_exponent = p.is_closed ? 2 : 1.5;
+  out.biaxial_exponent = is_even(given) ? 2 : 1.5;
   out.damage_share = 1 - z_pos.core.b_c;
   return out;
 }

@@ -37,7 +37,7 @@ struct RingProperties {
   double EA = 0;                    // [N]
   double EI_y = 0, EI_z = 0;        // about axes through the centroid along y and z [N·m²]
   double EI_yz = 0;                 // ∫ E y z dA about the centroid; 0: y and z are principal axes [N·m²]
-  bool is_closed = false;           // a whole ring
+  bool is_closed = false;           // concrete all around
 };
 /// Throws InputError for a ring that cannot be computed, or nothing left of it.
 RingProperties calc_ring_properties(const RingInput&);

@@ -161,6 +161,40 @@ TEST(Ring, WithAMouthTheMomentTowardsItIsThatOfItsLips) {
   EXPECT_GT(std::abs(peak_at(rcc.z_neg, N) - found), 0.02 * found);
 }
 
+TEST(Ring, ItsMirrorImageHasTheSameCurvesToTheOtherSide) {
+  RingInput in = chimney_ring(), image = in;
+  // a mouth towards the fall and a cut to one side of it
+  in.sectors = {{85 * pi / 180, 115 * pi / 180, 1, 1},
+                {115 * pi / 180, 140 * pi / 180, 0.1, 1},
+                {140 * pi / 180, 275 * pi / 180, 1, 1}};
+  for (size_t i = in.sectors.size(); i-- > 0;) {
+    const RingSector& s = in.sectors[i];
+    image.sectors.push_back({2 * pi - s.to, 2 * pi - s.from, s.concrete, s.bars});
+  }
+  turn_to_principal_axes(in), turn_to_principal_axes(image);
+  const Rcc a = make_ring_rcc(in), b = make_ring_rcc(image);
+  EXPECT_NEAR(a.EI_y, b.EI_y, 1e-9 * a.EI_y);
+  const auto expect_same = [](const MomentFamily& f, const MomentFamily& g) {
+    ASSERT_EQ(f.rotation.size(), g.rotation.size());
+    const double most = *std::max_element(f.moment.begin(), f.moment.end());
+    for (size_t j = 0; j < f.rotation.size(); ++j) EXPECT_NEAR(f.rotation[j], g.rotation[j], 1e-6 * f.rotation.back());
+    for (size_t j = 0; j < f.moment.size(); ++j) EXPECT_NEAR(f.moment[j], g.moment[j], 1e-3 * most) << j;
+  };
+  expect_same(a.y_pos, b.y_neg), expect_same(a.y_neg, b.y_pos);
+  expect_same(a.z_pos, b.z_pos), expect_same(a.z_neg, b.z_neg);
+}
+
+TEST(Ring, ACutThatDoesNotOpenItIsTwistedByShearAround) {
+  RingInput in = chimney_ring(), cut = in;
+  const double half = 0.5;
+  cut.sectors = {{0, pi, 1, 1}, {pi, 2 * pi, half, 1}};
+  const Rcc whole = make_ring_rcc(in), weak = make_ring_rcc(cut);
+  EXPECT_NEAR(weak.GJ, whole.GJ / (0.5 + 0.5 / half), 1e-9 * whole.GJ);
+  EXPECT_NEAR(weak.torsion, half * whole.torsion, 1e-9 * whole.torsion);
+  EXPECT_EQ(whole.biaxial_exponent, 2);
+  EXPECT_EQ(weak.biaxial_exponent, 1.5);
+}
+
 TEST(Ring, BarsLeftByAChargeAreTheirShareOfThePull) {
   RingInput in = chimney_ring();
   in.sectors = {{-1.5, 1.5, 1, 1}};
