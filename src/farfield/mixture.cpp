@@ -198,9 +198,9 @@ fem::ExplicitMaterial make_panel_material(const product::Plan& plan, const produ
   fill_law(
       m,
       [&](double e) {
-        const double size =
-            std::min(std::abs(e) * steel.Es,
-                     steel.fy + std::max(0.0, std::abs(e) - steel.fy / steel.Es) * (steel.fu - steel.fy) / steel.eps_u);
+        const double eps_y = steel.fy / steel.Es, plastic = std::max(0.0, std::abs(e) - eps_y);
+        const double size = std::min(
+            {std::abs(e) * steel.Es, steel.fy + plastic * (steel.fu - steel.fy) / (steel.eps_u - eps_y), steel.fu});
         return nearfield::calc_resultants(plain, e, 0).N / area + share * std::copysign(size, e);
       },
       plain.core.eps_ct, steel.fy / steel.Es, steel.eps_u, in.length / element_length);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "base/rotation_fit.h"
 #include "farfield/boxes.h"
@@ -74,13 +73,23 @@ Motion::Motion(const product::Plan& plan, const Whole& whole, const mbs::Model& 
                             fe.materials[static_cast<size_t>(element.material)].density * element.mass_factor);
     for (const int b : whole.bodies[e]) body_elements_[static_cast<size_t>(b)].push_back(static_cast<int>(e));
   }
-  std::set<int> charged;
-  for (const ChargeElements& c : whole.charges) charged.insert(c.elements.begin(), c.elements.end());
+  std::map<int, std::vector<int>> charged;  // elements, and the bars that their charge leaves
+  for (size_t c = 0; c < whole.charges.size(); ++c)
+    for (const int e : whole.charges[c].elements) charged[e] = fe.releases[c].bars;
   std::multimap<int, int> elements_of;
   for (size_t e = 0; e < fe.elements.size(); ++e) elements_of.emplace(whole.grid.cells[e].member, static_cast<int>(e));
+  // what a charge takes belongs to the nearest of the zones on which charges act
+  const auto is_of_charge = [&](const collapse::ZoneEntry& z, int element, int axis) {
+    if (!std::isfinite(z.firing_time) || charged.count(element) == 0) return false;
+    const double place = centre_[static_cast<size_t>(element)][axis], away = std::abs(place - z.p_W[axis]);
+    return std::none_of(map.elements.begin(), map.elements.end(), [&](const collapse::ZoneEntry& other) {
+      return other.member == z.member && std::isfinite(other.firing_time) &&
+             std::abs(place - other.p_W[axis]) < away - 1e-9;
+    });
+  };
   // cells of one cross-section lie at the same place along the member, to a thousandth of a millimetre
   const auto gather_sections = [&](const collapse::ZoneEntry& z) {
-    std::vector<std::vector<int>> out;
+    std::vector<ZoneElements::Section> out;
     const int member = plan.find_member(z.member);
     if (member < 0 || plan.members[static_cast<size_t>(member)].section < 0) return out;
     const int axis = axis_of(plan.members[static_cast<size_t>(member)]);
@@ -88,11 +97,16 @@ Motion::Motion(const product::Plan& plan, const Whole& whole, const mbs::Model& 
     const auto [first, last] = elements_of.equal_range(member);
     for (auto it = first; it != last; ++it) {
       const double place = centre_[static_cast<size_t>(it->second)][axis];
-      if (std::abs(place - z.p_W[axis]) <= size) at[std::lround(1e6 * place)].push_back(it->second);
+      if (std::abs(place - z.p_W[axis]) <= size || is_of_charge(z, it->second, axis))
+        at[std::lround(1e6 * place)].push_back(it->second);
     }
-    for (auto& [place, cells] : at)
-      if (std::none_of(cells.begin(), cells.end(), [&](int e) { return charged.count(e) != 0; }))
-        out.push_back(std::move(cells));
+    for (auto& [place, cells] : at) {
+      const auto taken = std::find_if(cells.begin(), cells.end(), [&](int e) { return charged.count(e) != 0; });
+      if (taken == cells.end())
+        out.push_back({std::move(cells), {}});
+      else if (std::isfinite(z.firing_time))
+        out.push_back({cells, charged[*taken]});
+    }
     return out;
   };
   const auto gather = [&](const collapse::ZoneEntry& z) {
@@ -183,9 +197,12 @@ mbs::View Motion::calc_view(const fem::ExplicitSystem& system, double time) cons
       utilisation = std::max(utilisation, calc_utilisation(m, system.stress(e)));
     }
     const auto is_gone = [&](int e) { return !system.is_alive(e); };
-    const auto is_cut = [&](const std::vector<int>& s) { return std::all_of(s.begin(), s.end(), is_gone); };
-    if (gone > 0 && (2 * gone >= z.elements.size() || std::any_of(z.sections.begin(), z.sections.end(), is_cut)))
-      return mbs::ElementState::Broken;
+    const auto is_cut = [&](const ZoneElements::Section& s) {
+      return std::all_of(s.elements.begin(), s.elements.end(), is_gone) &&
+             std::none_of(s.bars.begin(), s.bars.end(), [&](int bar) { return system.bears(bar); });
+    };
+    const bool is_mostly_gone = gone > 0 && 2 * gone >= z.elements.size();
+    if (is_mostly_gone || std::any_of(z.sections.begin(), z.sections.end(), is_cut)) return mbs::ElementState::Broken;
     if (gone > 0 || limit > 0.5) return mbs::ElementState::Softening;
     return plastic > kYielded ? mbs::ElementState::Yielded : mbs::ElementState::Elastic;
   };
@@ -231,7 +248,9 @@ std::vector<double> Motion::calc_foot_forces(const fem::ExplicitSystem& system) 
   for (const Foot& foot : whole_.feet) {
     // what the elements press down, and the weight that is lumped at the held nodes
     double force = -system.calc_resultant(foot.elements, foot.nodes, foot.p_W).force.z;
-    for (const int n : foot.nodes) force += system.node_mass(n) * norm(whole_.fe.gravity);
+    for (size_t i = 0; i < foot.nodes.size(); ++i)
+      force += foot.shares[i] * system.node_mass(foot.nodes[i]) * norm(whole_.fe.gravity);
+    for (const int b : foot.bars) force += system.bar_force_of_ground(b).z;
     forces.push_back(force);
   }
   return forces;

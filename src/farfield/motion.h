@@ -12,8 +12,12 @@ namespace topple::farfield {
 /// A zone of the manager and the elements around its place.
 struct ZoneElements {
   std::vector<int> elements;  // of both its bodies, with their centres within one size of the zone's place
-  /// Of its column or beam, whole cross-sections that have their centres as near along it and that no charge takes.
-  std::vector<std::vector<int>> sections;
+  /// Of its column or beam, whole cross-sections that have their centres as near along it. Those that a charge takes
+  /// count for the zones on which it acts, with the bars that it leaves.
+  struct Section {
+    std::vector<int> elements, bars;
+  };
+  std::vector<Section> sections;
 };
 
 class Motion {

@@ -412,6 +412,8 @@ class Course {
     double weight = 0;
     for (size_t b = 0; b < model_.bodies.size(); ++b)
       if (!model_.bodies[b].fixed) weight += v->mass[b] * norm(model_.gravity);
+    for (size_t e = 0; e < whole_.is_stump.size(); ++e)  // what mass scaling added has weight too
+      if (whole_.is_stump[e] == 0) weight += system_.added_mass(static_cast<int>(e)) * norm(model_.gravity);
     return weight > 0 ? std::abs(norm(v->ground_force) - weight) / weight : 0;
   }
 

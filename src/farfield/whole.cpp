@@ -88,14 +88,15 @@ void add_once(std::vector<T>& list, const T& x) {
 /// area in plane [m].
 double calc_cell_length(const Grid& grid, const Cell& cell, const product::Plan& plan, double volume) {
   const product::Member& m = plan.members[static_cast<size_t>(cell.member)];
-  if (m.section < 0) return std::sqrt(volume / plan.panels[static_cast<size_t>(m.panel)].thickness);
-  const int axis = axis_of(m);
+  const bool is_panel = m.section < 0;
+  const int across = m.kind == product::MemberKind::Slab ? 2 : axis_of(m) == 0 ? 1 : 0;
+  const int axis = is_panel ? across : axis_of(m);
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const int n : cell.node) {
     const double at = grid.nodes[static_cast<size_t>(n)][axis];
     low = std::min(low, at), high = std::max(high, at);
   }
-  return high - low;
+  return is_panel ? std::sqrt(volume / (high - low)) : high - low;
 }
 
 /// Lengths of the zones in which damage of each member gathers: those of the manager's (members) [m].
@@ -264,8 +265,21 @@ Whole make_whole(const product::Plan& plan, const collapse::Knowledge& k, const 
     }
     if (touches) feet[grid.cells[c].member].elements.push_back(static_cast<int>(c));
   }
+  std::map<int, int> feet_on;  // a node
+  for (const auto& [member, foot] : feet)
+    for (const int n : foot.nodes) ++feet_on[n];
+  for (size_t c = 0; c < charges.charges.size(); ++c) {
+    const ChargeElements& of = charges.charges[c];
+    const auto foot =
+        feet.find(plan.stages[static_cast<size_t>(of.stage)].charges[static_cast<size_t>(of.charge)].member);
+    for (const int i : charges.bars_of[c]) {
+      const fem::ExplicitBar& bar = charges.bars[static_cast<size_t>(i)];
+      if (foot != feet.end() && (bar.a.node[0] < 0 || bar.b.node[0] < 0)) foot->second.bars.push_back(i);
+    }
+  }
   for (auto& [member, foot] : feet) {
     foot.member = member;
+    for (const int n : foot.nodes) foot.shares.push_back(1.0 / feet_on[n]);
     for (const int n : foot.nodes)
       foot.p_W += (1.0 / static_cast<double>(foot.nodes.size())) * fe.nodes[static_cast<size_t>(n)];
     whole.feet.push_back(std::move(foot));

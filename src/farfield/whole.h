@@ -15,7 +15,9 @@ namespace topple::farfield {
 struct Foot {
   int member = -1;
   std::vector<int> nodes, elements;
-  Vec3 p_W;  // middle of the nodes [m]
+  std::vector<double> shares;  // of each node's weight: others stand on it too (nodes)
+  std::vector<int> bars;       // that end in the ground, of charges at the foot
+  Vec3 p_W;                    // middle of the nodes [m]
 };
 
 struct Whole {

@@ -21,6 +21,12 @@ double ExplicitSystem::time() const { return static_cast<double>(inside_->s.step
 double ExplicitSystem::step() const { return inside_->h; }
 long long ExplicitSystem::steps() const { return inside_->s.steps; }
 double ExplicitSystem::added_mass() const { return inside_->added_mass; }
+double ExplicitSystem::added_mass(int element) const {
+  const ExplicitElement& e = inside_->model.elements[static_cast<size_t>(element)];
+  const double density = inside_->model.materials[static_cast<size_t>(e.material)].density;
+  return inside_->element_mass[static_cast<size_t>(element)] -
+         inside_->element_volume[static_cast<size_t>(element)] * density * e.mass_factor;
+}
 int ExplicitSystem::scaled_elements() const { return inside_->scaled_elements; }
 const ExplicitSystem::Timing& ExplicitSystem::timing() const { return inside_->timing; }
 std::string ExplicitSystem::instruction_set() const { return kernel::target_name(); }
@@ -109,6 +115,13 @@ double field_of(const Inside& in, const State& state, int element, int field) {
 bool ExplicitSystem::is_alive(int element) const { return field_of(*inside_, inside_->s, element, kernel::kMass) > 0; }
 double ExplicitSystem::plastic_strain(int element) const {
   return field_of(*inside_, inside_->s, element, kernel::kStrain);
+}
+bool ExplicitSystem::bears(int bar) const { return inside_->s.bars[static_cast<size_t>(bar)].phase == 1; }
+Vec3 ExplicitSystem::bar_force_of_ground(int bar) const {
+  const ExplicitBar& b = inside_->model.bars[static_cast<size_t>(bar)];
+  const Vec3& pull = inside_->s.bars[static_cast<size_t>(bar)].pull;
+  if (!bears(bar) || (b.a.node[0] >= 0 && b.b.node[0] >= 0)) return {};
+  return b.a.node[0] < 0 ? pull : -pull;
 }
 double ExplicitSystem::damage(int element) const { return field_of(*inside_, inside_->s, element, kernel::kDamage); }
 std::array<double, 6> ExplicitSystem::stress(int element) const {

@@ -110,6 +110,7 @@ class ExplicitSystem {
   long long steps() const;
   /// Mass that mass scaling added, and the number of elements concerned [kg].
   double added_mass() const;
+  double added_mass(int element) const;
   int scaled_elements() const;
 
   /// Dead load into equilibrium without motion, by pseudo-dynamic relaxation (eq. 20); time stays, velocities are 0
@@ -137,6 +138,8 @@ class ExplicitSystem {
   double damage(int element) const;                 // 1: removed
   std::array<double, 6> stress(int element) const;  // mean, xx yy zz xy yz zx, positive in tension [Pa]
   void copy_positions(std::vector<Vec3>&) const;    // (nodes)
+  bool bears(int bar) const;                        // from its release until it tears or loses an end
+  Vec3 bar_force_of_ground(int bar) const;          // at its held end [N]
 
   const std::vector<Removal>& removals() const;       // in the order of time, then of elements
   const std::vector<DebrisParticle>& debris() const;  // never removed

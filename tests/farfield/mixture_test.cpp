@@ -232,6 +232,23 @@ TEST(Mixture, OfAPanelHoldsItsBarsOverTheThickness) {
   EXPECT_NEAR(m.tension_limit * 0.4, plan.steels.front().eps_u * floor.thickness, 5e-3 * floor.thickness);
 }
 
+TEST(Mixture, OfAPanelIsNotCrushedEarlierForStrongerBars) {
+  product::Plan plan = read(house());
+  product::Panel wall = plan.panels.front();
+  wall.as_top = wall.as_bottom = 20e-4;
+  plan.steels.front().eps_u = 0.025;
+  double limit[2], end[2];
+  for (const int i : {0, 1}) {
+    plan.steels.front().fu = (i == 0 ? 1.002 : 1.1) * plan.steels.front().fy;
+    const fem::ExplicitMaterial m = make_panel_material(plan, wall, wall.thickness, 0.4);
+    limit[i] = m.compression_limit;
+    end[i] = find_stress(m, m.compression_limit, &fem::YieldPoint::compression);
+    // no bar bears more than its strength
+    EXPECT_LT(end[i], 2 * 20e-4 / wall.thickness * plan.steels.front().fu + 0.1 * plan.concretes.front().fc);
+  }
+  EXPECT_GT(limit[1], 0.8 * limit[0]);
+}
+
 TEST(Mixture, OfPlainConcreteCracksAndCrushesWithItsEnergies) {
   product::Plan plan = read(house());
   product::Panel bare = plan.panels.front();

@@ -325,6 +325,84 @@ TEST(FarfieldPhysics, FindsReactionsInBalanceWithCellsLargerThanStumps) {
   EXPECT_EQ(f.status, record::Status::Good);
 }
 
+/// Four columns under a floor; walls of 60 cm between columns as thick, or charges with all their bars at the feet.
+std::string table(const std::string& more) {
+  return materials() + grid("A = \"0 m\", B = \"4 m\"", "1 = \"0 m\", 2 = \"4 m\"", 1, "4 kN/m2") +
+         "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n[[slabs]]\npanel = \"floor\"\n" + more;
+}
+
+TEST(FarfieldPhysics, CountsNodesOnceOnWhichAWallAndAColumnStand) {
+  FeOptions fe = coarse();
+  fe.grid.size = 1.5;  // a large share of all lies at the feet
+  const record::Record r = run(table("[wall.thick]\nthickness = \"30 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\n"
+                                     "as_faces = \"4 cm2/m\"\n[[walls]]\npanel = \"thick\"\n" +
+                                     analysis("20 ms")),
+                               fe);
+  const record::Finding& f = find(r, "verification.equilibrium");
+  EXPECT_LT(f.value, 2e-3) << f.text;
+  EXPECT_EQ(f.status, record::Status::Good) << f.text;
+}
+
+TEST(FarfieldPhysics, WeighsWhatScalingOfMassAdds) {
+  FeOptions fe = coarse();
+  for (const double step : {0.02e-3, 0.024e-3, 0.028e-3, 0.032e-3, 0.036e-3}) {
+    fe.scaled_step = step;
+    const record::Record r = run(with_duration(house(), "20 ms"), fe);
+    const record::Finding& f = find(r, "verification.equilibrium");
+    EXPECT_LT(f.value, 5e-3) << step << ' ' << f.text;
+  }
+}
+
+TEST(FarfieldPhysics, StandsOnBarsThatAreHeldInTheGround) {
+  std::string plan = table(charge("C-*", "10 ms", "scatter = \"0 ms\"") + analysis("300 ms"));
+  const auto put = [&plan](const std::string& old, const std::string& now) {
+    const size_t at = plan.find(old);
+    ASSERT_NE(at, std::string::npos) << old;
+    plan.replace(at, old.size(), now);
+  };
+  put("diameter = \"20 mm\" }", "diameter = \"40 mm\" }");
+  put("position = \"1 m\"", "position = \"0.15 m\"");
+  put("destroyed_length = \"1 m\"", "destroyed_length = \"30 cm\"");
+  put("residual_bars = 0.1", "residual_bars = 1");
+  const record::Record r = run(plan, coarse());
+  const std::vector<double>& force = series(r, "ground_force");
+  const double weight = force.front();
+  double mean = 0, rows = 0;
+  const size_t half = force.size() / 2;
+  for (size_t i = half; i < force.size(); ++i) {
+    mean += force[i] / static_cast<double>(force.size() - half);
+    rows += (series(r, "ground_force_row_A")[i] + series(r, "ground_force_row_B")[i]) /
+            static_cast<double>(force.size() - half);
+  }
+  // it swings on them
+  EXPECT_NEAR(mean, weight, 0.1 * weight);
+  EXPECT_NEAR(rows, weight, 0.15 * weight);
+}
+
+TEST(Farfield, LetsABeamGoWhoseEndsWereCharged) {
+  for (const std::string beam : {"B-A1B1-0", "B-A1A2-0"}) {
+    std::string text = table(charge("C-B2-0", "10 ms"));
+    for (const char* at : {"0.4 m", "3.6 m"})
+      text +=
+          "[[stage.charge]]\nmembers = [\"" + beam + "\"]\nposition = \"" + at + "\"\ndestroyed_length = \"30 cm\"\n";
+    const Building built(read(text + analysis("60 ms")));
+    const auto& [plan, map, model, whole] = built;
+    const Motion motion(plan, whole, model, map, coarse().grid.size);
+    fem::ExplicitSystem system(whole.fe, {});
+    const auto count_broken = [&, &map = map] {
+      const mbs::View v = motion.calc_view(system, 0);
+      int count = 0;
+      for (size_t i = 0; i < map.elements.size(); ++i)
+        count += map.elements[i].member == beam && v.element_state[i] == mbs::ElementState::Broken;
+      return count;
+    };
+    EXPECT_EQ(count_broken(), 0);
+    for (const ChargeElements& c : whole.charges) system.remove(c.elements);
+    // along x each end has a zone, along y both are of one
+    EXPECT_EQ(count_broken(), beam == "B-A1B1-0" ? 2 : 1) << beam;
+  }
+}
+
 TEST(FarfieldPhysics, ShakesTheGroundWhateverTheRestitutionOfTheSite) {
   const auto shaking = [](const std::string& restitution) {
     const record::Record r =
