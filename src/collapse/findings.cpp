@@ -176,8 +176,9 @@ void add_near_verdicts(const Context& c, const Mechanism& m) {
 
 /// Whether an upper block that moves at frame `last` has, since `begin` [s], not yet lost half of the speed that it had
 /// gained: so far it may fall as well as sway. Speeds are those of its mass centre from frame to frame.
-bool gains_speed(const Context& c, double begin, size_t last) {
+bool gains_speed(const Context& c, const std::vector<bool>& counts, double begin, size_t last) {
   for (size_t s = 0; s < c.map.structures.size(); ++s) {
+    if (!counts[s]) continue;
     const std::vector<BlockFrame>& block = c.recorder.block_frames(s);
     if (block[last].fastest < c.k.rest_speed) continue;
     double highest = 0;
@@ -243,15 +244,24 @@ Standing add_stability(const Context& c) {
   // each interval of standing: its last frame before the next stage, and what happened in it
   const auto stages = find_stage_times(c.map, true);
   Standing out;
-  const std::vector<BlockFrame> block = c.recorder.farthest_block_frames();
-  const auto& zones = c.recorder.zone_frames();
+  // of several structures those that have charges to come
+  std::vector<bool> counts(c.map.structures.size(), true), counted_zones;
+  std::vector<BlockFrame> block = c.recorder.farthest_block_frames();
+  std::vector<ZoneFrame> zones = c.recorder.zone_frames();
+  const auto look_at_those_to_stand = [&](double from) {
+    if (c.map.structures.size() < 2) return;
+    counts = find_structures_to_stand(c.plan, c.map, from);
+    counted_zones = find_zones_of(counts, c.map, c.r);
+    block = c.recorder.farthest_block_frames(counts);
+    zones = find_zone_frames(c.r, counted_zones);
+  };
   const auto describe = [&](const std::string& id, const std::string& title, size_t i, bool settled, double begin) {
     // before the first charge the smaller margin of both axes about which heads of ground columns may turn
     const HeadsAcross* across = settled ? nullptr : c.across;
     const bool is_across = across != nullptr && !across->zones.empty() && is_nearer(across->zones[0], zones[i]);
     const record::Record& r = is_across ? across->record : c.r;
     const ZoneFrame& z = is_across ? across->zones[0] : zones[i];
-    const auto margins = find_margins(r, is_across ? 0 : i);
+    const auto margins = is_across ? find_margins(r, 0) : find_margins(r, i, counted_zones);
     // margins are those of a building that stands
     const bool is_standing = stands(block[i], c.k);
     const bool has = is_standing && z.zone >= 0 && z.utilisation > 0;
@@ -279,7 +289,7 @@ Standing add_stability(const Context& c) {
     bool is_still = true, may_fall = false;
     if (settled && is_standing) {
       is_still = block[i].fastest < c.k.rest_speed;
-      may_fall = !is_still && gains_speed(c, begin, i);
+      may_fall = !is_still && gains_speed(c, counts, begin, i);
       text += is_still   ? " It stands still."
               : may_fall ? " It has not slowed down since the stage before, so that it may sway or fall: not judged."
                          : fmt::format(" It still sways (still: below {:.2f} m/s).", c.k.rest_speed);
@@ -290,6 +300,12 @@ Standing add_stability(const Context& c) {
       if (has && !is_still && worst != i)
         text += fmt::format(" This is the margin of one instant: the least in the pause is {:.2f}, at {:.2f} s.",
                             1 / zones[worst].utilisation, zones[worst].time);
+    }
+    if (settled && std::find(counts.begin(), counts.end(), false) != counts.end()) {
+      std::string names;
+      for (size_t s = 0; s < counts.size(); ++s)
+        if (counts[s]) names += (names.empty() ? "" : ", ") + c.map.structures[s].name;
+      text += fmt::format(" Judged of what has charges to come: {}.", names);
     }
     const Status status = !is_standing                                                  ? Status::Bad
                           : may_fall                                                    ? Status::NotJudged
@@ -303,6 +319,7 @@ Standing add_stability(const Context& c) {
   describe("stability.start", "Before the first charge", 0, false, 0);
   for (size_t s = 0; s + 1 < stages.size(); ++s) {
     const double begin = stages[s].last, end = stages[s + 1].first;
+    look_at_those_to_stand(end);
     const size_t i = find_frame(block, end);
     const std::string id = fmt::format("stability.stage_{}", s + 1),
                       title = fmt::format("Between \"{}\" and \"{}\"", c.stage_name(stages[s].stage),
@@ -471,18 +488,25 @@ void add_clearances(const Context& c) {
           "Nothing lands on it, but parts are over it: {} comes down to {:.1f} m above the ground there, at {:.2f} s",
           lowest_who, a.lowest, a.lowest_when);
     if (asked) text += fmt::format("; the limit is {} m", limit);
+    const double stave = calc_stave_error(c.r.bodies[a.body]);
+    std::string of_staves;
+    if (stave > 0)
+      of_staves = fmt::format(" A shaft's ring is made of flat staves: real distances may differ by {:.2f} m.", stave);
     const bool is_reached = is_over, lands = a.lowest <= kOnGround;
+    const bool is_close = asked && !is_over && std::abs(a.least - *n.clearance) < stave;
     const bool is_broken = asked && (a.least < *n.clearance || lands);
     const std::string why = !asked || is_broken ? "" : find_what_is_open(c, [&](const OpenPart& part) {
       return calc_distances_at_end(c, part.body, n.footprint).first - part.way < *n.clearance;
     });
     const Status status = !asked           ? (is_reached ? Status::Warning : Status::Info)
+                          : is_close       ? Status::NotJudged
                           : is_broken      ? Status::Bad
                           : !why.empty()   ? Status::NotJudged
                           : is_reached     ? Status::Warning
                           : c.is_under_way ? Status::Info
                                            : Status::Good;
-    c.add("clearance." + n.name, "Clearance", n.name, fmt::format("{}.{}", text, why), a.least, "m", status);
+    c.add("clearance." + n.name, "Clearance", n.name, fmt::format("{}.{}{}", text, of_staves, why), a.least, "m",
+          status);
   }
 }
 
@@ -751,7 +775,8 @@ void add_rigid_block(const Context& c) {
   for (const BlockFrame& f : c.recorder.block_frames())
     rests &= f.time > block.release || norm(f.displacement) < c.k.stands_displacement;
   if (stages.size() > 1)
-    rests &= !gains_speed(c, stages[stages.size() - 2].last, find_frame(c.recorder.block_frames(), block.release));
+    rests &= !gains_speed(c, std::vector<bool>(c.map.structures.size(), true), stages[stages.size() - 2].last,
+                          find_frame(c.recorder.block_frames(), block.release));
   if (!rests) {
     c.add("rigid_block", "Mechanism", "Beside a rigid block",
           "No comparison: the upper block was in motion before the last stage fired.", kNone, "rad");

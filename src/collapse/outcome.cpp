@@ -189,15 +189,23 @@ double rounding_of(const PlacedBox& box) {
   return std::max(1e-5, 0x1p-22 * std::max(std::abs(box.X_WS.p.x), std::abs(box.X_WS.p.y)));
 }
 
-/// Whether a box seen from above overlaps an area by no more than a wall beside it does whose joint closes.
-bool only_touches(const PlacedBox& box, const Polygon& area) {
-  constexpr double least = 0.01;  // [m]
+/// Whether a box seen from above overlaps an area by no more than so much [m].
+bool only_touches(const PlacedBox& box, const Polygon& area, double least) {
   PlacedBox within = box;
   for (int i = 0; i < 3; ++i) within.half[i] = std::max(0.0, box.half[i] - least);
   return calc_distance(calc_outline(within), area) > 0;
 }
 
 }  // namespace
+
+double calc_stave_error(const record::BodyInfo& body) {
+  constexpr size_t least_staves = 16;  // around a shaft; of a column a stump has fewer boxes
+  if (body.kind != "shaft" && (body.kind != "stump" || body.shapes.size() < least_staves)) return 0;
+  double most = 0;
+  // corners of a stave lie half its breadth times tan(angle / 4) beyond the ring
+  for (const record::BoxShape& s : body.shapes) most = std::max(most, s.half.y);
+  return std::tan(0.5 * std::numbers::pi / least_staves) * most;
+}
 
 Approach find_approach(const record::Record& r, const Polygon& area, const std::atomic<bool>* cancel) {
   Approach out;
@@ -221,7 +229,10 @@ Approach find_approach(const record::Record& r, const Polygon& area, const std::
         // round-off of what stands is no way
         if (d < out.least - (std::isfinite(out.least) ? rounding_of(box) : 0))
           out.least = d, out.when = r.time[f], out.body = b;
-        if (d > 0 || only_touches(box, area)) continue;
+        // as a wall beside it whose joint closes, or at the start the stave of a ring beside it
+        constexpr double joint = 0.01;  // [m]
+        const double may_overlap = f == 0 ? std::max(joint, calc_stave_error(r.bodies[b])) : joint;
+        if (d > 0 || only_touches(box, area, may_overlap)) continue;
         const double height = calc_lowest_over(box, area);
         if (height < out.lowest) out.lowest = height, out.lowest_when = r.time[f], out.lowest_body = b;
       }

@@ -56,6 +56,9 @@ double calc_deviation(double found, double azimuth);
 
 inline constexpr double kOnGround = 0.1;  // height of what lies on the ground or on what lies there [m]
 
+/// How far the staves of a shaft's body reach beyond its ring, or lie within it, at the most; of other bodies 0 [m].
+double calc_stave_error(const record::BodyInfo&);
+
 /// What comes how near to an area, seen from above, and how low it comes there.
 struct Approach {
   double least = std::numeric_limits<double>::infinity(), when = 0;  // distance in plan; 0: over it [m, s]

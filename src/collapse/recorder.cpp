@@ -277,15 +277,21 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
   return out;
 }
 
-std::vector<BlockFrame> Recorder::farthest_block_frames() const {
-  std::vector<BlockFrame> out = block_.front();
-  for (size_t i = 0; i < out.size(); ++i)
-    for (size_t s = 1; s < block_.size(); ++s) {
+std::vector<BlockFrame> Recorder::farthest_block_frames(const std::vector<bool>& counts) const {
+  std::vector<BlockFrame> out;
+  for (size_t s = 0; s < block_.size(); ++s) {
+    if (!counts.empty() && !counts[s]) continue;
+    if (out.empty()) {
+      out = block_[s];
+      continue;
+    }
+    for (size_t i = 0; i < out.size(); ++i) {
       const BlockFrame& other = block_[s][i];
       const double fastest = std::max(out[i].fastest, other.fastest);
       if (calc_away(other, k_) > calc_away(out[i], k_)) out[i] = other;
       out[i].fastest = fastest;
     }
+  }
   return out;
 }
 

@@ -66,7 +66,8 @@ class Recorder {
   /// Of a structure of the map, the heaviest unless said otherwise.
   const std::vector<BlockFrame>& block_frames(size_t structure = 0) const { return block_[structure]; }
   /// At each frame that of the structure whose block is farthest from its place, with the fastest part of all.
-  std::vector<BlockFrame> farthest_block_frames() const;
+  ///   counts  which structures are looked at, one at least; empty: all (structures)
+  std::vector<BlockFrame> farthest_block_frames(const std::vector<bool>& counts = {}) const;
   const std::vector<ZoneFrame>& zone_frames() const { return zone_frames_; }
   double first_touchdown() const { return first_.time; }  // of an upper body; NaN if none [s]
   double first_touchdown(size_t structure) const;         // of an upper body of it

@@ -9,6 +9,7 @@
 #include "collapse/manager.h"
 #include "collapse/plan_record.h"
 #include "collapse/recorder.h"
+#include "collapse/stability.h"
 #include "collapse/vibration.h"
 #include "mbs/batch.h"
 #include "mbs/kernel.h"
@@ -170,11 +171,17 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
   out.tilt = series("tilt_angle");
   const std::vector<Mechanism> verdicts = judge_structures(s.plan, s.model, s.map, k, *s.recorder, s.summary);
   out.mechanism = judge_run(verdicts, s.map, k, *s.recorder);
-  const std::vector<BlockFrame> block = s.recorder->farthest_block_frames();
   const std::vector<StageTimes> stages = find_stage_times(s.map, true);
+  const std::vector<bool> counts =
+      find_structures_to_stand(s.plan, s.map, stages.empty() ? out.time.back() : stages.back().first);
+  const std::vector<BlockFrame> block = s.recorder->farthest_block_frames(counts);
   const size_t before = find_frame(block, stages.empty() ? out.time.back() : stages.back().first);
   out.stood = stages.size() < 2 || stands(block[before], k);
-  out.utilisation = out.stood ? s.recorder->zone_frames()[before].utilisation : 1;
+  const auto find_use = [&] {
+    if (counts.size() < 2) return s.recorder->zone_frames()[before].utilisation;
+    return find_zone_frames(s.record, find_zones_of(counts, s.map, s.record))[before].utilisation;
+  };
+  out.utilisation = out.stood ? find_use() : 1;
   out.touchdown = s.recorder->first_touchdown();
   const std::vector<double>& kinetic = series("energy_kinetic");
   out.touchdown_energy = out.touchdown <= out.time.back() ? s.recorder->first_touchdown_kinetic() : kinetic.back();

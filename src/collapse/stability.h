@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "collapse/manager.h"
+#include "collapse/recorder.h"
 #include "record/record.h"
 
 namespace topple::collapse {
@@ -15,6 +17,15 @@ struct MemberMargin {
   record::ZoneState state = record::ZoneState::Elastic;
 };
 /// Of every member at a frame, lowest first: the zones that are neither broken nor fired and carry something.
-std::vector<MemberMargin> find_margins(const record::Record&, size_t frame);
+///   counts  which zones are looked at; empty: all (zones)
+std::vector<MemberMargin> find_margins(const record::Record&, size_t frame, const std::vector<bool>& counts = {});
+
+/// Structures on which charges act at a time or later, as these alone are to stand until then; of a single one it is
+/// true. (structures)
+std::vector<bool> find_structures_to_stand(const product::Plan&, const ModelMap&, double from);
+/// Zones of such structures. (zones)
+std::vector<bool> find_zones_of(const std::vector<bool>& structures, const ModelMap&, const record::Record&);
+/// As Recorder::zone_frames, of the zones that count.
+std::vector<ZoneFrame> find_zone_frames(const record::Record&, const std::vector<bool>& counts);
 
 }  // namespace topple::collapse

@@ -433,6 +433,7 @@ class Dataset {
     if (!c.pairs.empty()) losses_.add("rules of contact for single pairs of bodies are left out");
     bool moving = false;
     for (size_t b = 0; b < model_.bodies.size(); ++b) moving |= !model_.bodies[b].fixed && !graphics_[b].empty();
+    if (model_.is_planar) losses_.add("forces and motion across the plane are not left out");
     if (c.bodies && moving) losses_.add("bodies pass through each other: only contact with the ground is written");
     if (!c.ground || !moving) return;
     // the ground as a thick plate far beyond the building
@@ -446,9 +447,18 @@ class Dataset {
     text_ += fmt::format(", BOX\n, CORNER = {}\n, X = {}, Y = {}, Z = {}\n", corner, num(2 * reach), num(2 * reach),
                          num(0.1 * reach));
     const int ground = graphic_;
+    std::vector<bool> is_tied(model_.bodies.size(), false);
+    const auto tie = [&](BodyId a, BodyId b) {
+      if (is_ground(a) && !is_ground(b)) is_tied[static_cast<size_t>(b.index)] = true;
+      if (is_ground(b) && !is_ground(a)) is_tied[static_cast<size_t>(a.index)] = true;
+    };
+    for (const mbs::Joint& j : model_.joints) tie(j.parent, j.child);
+    for (const mbs::ZoneElement& e : model_.elements) tie(e.a, e.b);
+    for (const mbs::Bushing& k : model_.bushings) tie(k.a, k.b);
     int id = 0;
     for (size_t b = 0; b < model_.bodies.size(); ++b) {
       if (model_.bodies[b].fixed || graphics_[b].empty()) continue;
+      if (is_tied[b]) losses_.add("a body that is tied to the ground touches it as well");
       std::string list;
       for (const int g : graphics_[b]) list += (list.empty() ? "" : ", ") + std::to_string(g);
       statement("CONTACT", ++id, model_.bodies[b].name);

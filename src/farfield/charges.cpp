@@ -140,13 +140,22 @@ ChargePlan plan_charges(const product::Plan& plan, const collapse::Knowledge& k,
     ChargeElements taken{d.stage, d.charge, {}};
     out.bars_of.emplace_back();
     const auto [first, last] = cells_of.equal_range(d.member);
+    // beside what goes the layer nearest to it is damaged at least
+    double below = std::numeric_limits<double>::infinity(), above = below;
+    for (auto it = first; it != last; ++it) {
+      const double at = grid.cells[it->second].centre[d.axis];
+      if (at <= d.from) below = std::min(below, d.from - at);
+      if (at >= d.to) above = std::min(above, at - d.to);
+    }
+    const double reach_below = reach > 0 ? std::max(reach, below + 1e-6) : 0;
+    const double reach_above = reach > 0 ? std::max(reach, above + 1e-6) : 0;
     for (auto it = first; it != last; ++it) {
       const size_t c = it->second;
       const double at = grid.cells[c].centre[d.axis];
       if (at > d.from && at < d.to) {
         taken.elements.push_back(static_cast<int>(c));
         if (out.taken_by[c] < 0 && !charge.fails) out.taken_by[c] = number;
-      } else if (!charge.fails && at > d.from - reach && at < d.to + reach &&
+      } else if (!charge.fails && at > d.from - reach_below && at < d.to + reach_above &&
                  charge.transition_damage > out.transition[c]) {
         out.damaged_by[c] = number, out.transition[c] = charge.transition_damage;
       }

@@ -109,12 +109,17 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
   s.cracks.assign(chunks.slots() * 3, 0);
   s.live.assign(chunks.slots() / W, 0);
   rows_of_element.resize(E);
-  first_part_of_row.assign(rows, std::numeric_limits<int>::max());
+  constexpr int none = std::numeric_limits<int>::max();
+  first_part_of_row.assign(rows, none);
   for (size_t n = 0; n < N; ++n) {
     double* row = s.rows.data() + 8 * static_cast<size_t>(chunks.row_of_node[n]);
     row[0] = model.nodes[n].x, row[1] = model.nodes[n].y, row[2] = model.nodes[n].z;
     if (!model.extra_mass.empty()) row[kernel::kNodeMass] = model.extra_mass[n];
   }
+  std::vector<bool> is_released(E, false);  // of a node the part is that of what stays
+  for (const ExplicitRelease& release : model.releases)
+    for (const int e : release.elements) is_released[static_cast<size_t>(e)] = true;
+  std::vector<int> released_part_of_row(rows, none);
   for (size_t e = 0; e < E; ++e) {
     const ExplicitElement& element = model.elements[e];
     parts = std::max(parts, element.part + 1);
@@ -128,7 +133,8 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
       rows_of_element[e][i] = row;
       s.rows[8 * row + kernel::kNodeMass] += element_mass[e] / 8;
       ++s.uses[row];
-      first_part_of_row[row] = std::min(first_part_of_row[row], element.part);
+      int& part = (is_released[e] ? released_part_of_row : first_part_of_row)[row];
+      part = std::min(part, element.part);
     }
     // the shortest way through: at ν = 0 half of it is the step times the speed of waves over √2
     ExplicitMaterial plain;
@@ -138,6 +144,7 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
     s.live[slot / W] = static_cast<unsigned char>(s.live[slot / W] | (1U << (slot % W)));
   }
   for (size_t row = 0; row < rows; ++row) {
+    if (first_part_of_row[row] == none) first_part_of_row[row] = released_part_of_row[row];
     double* r = s.rows.data() + 8 * row;
     if (s.uses[row] == 0) r[kernel::kNodeMass] = 0;
     r[kernel::kInverseMass] = r[kernel::kNodeMass] > 0 ? 1 / r[kernel::kNodeMass] : 0;

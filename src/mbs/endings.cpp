@@ -29,6 +29,7 @@ System::Ending System::find_ending(double before, double now, double limit) cons
 
 void System::impel(int body, const Vec3& impulse, const Vec3& turn) {
   if (body < 0 || fixed[static_cast<size_t>(body)]) return;
+  if (dot(impulse, impulse) + dot(turn, turn) > 0) state.has_rest = true;
   const size_t b = static_cast<size_t>(body);
   const bool is_planar = model.is_planar;
   state.v[b] += state.body[b].inverse_mass * (is_planar ? Vec3{impulse.x, 0, impulse.z} : impulse);

@@ -581,11 +581,13 @@ void System::check_joints() {
     }
     const double along = dot(axis, js.force);
     const double across2 = dot(js.force, js.force) - along * along;
-    if (-along > j.tension_limit) {
+    // a rest, which joints have held too, is no force
+    const bool is_judged = !state.has_rest;
+    if (is_judged && -along > j.tension_limit) {
       release_joint(i, "tension");
-    } else if (across2 > j.shear_limit * j.shear_limit) {
+    } else if (is_judged && across2 > j.shear_limit * j.shear_limit) {
       release_joint(i, "shear");
-    } else if (dot(js.moment, js.moment) > j.moment_limit * j.moment_limit) {
+    } else if (is_judged && dot(js.moment, js.moment) > j.moment_limit * j.moment_limit) {
       release_joint(i, "moment");
     } else if (std::abs(js.angle) > j.rotation_limit &&
                (j.rotational < 0 || state.rotational[static_cast<size_t>(j.rotational)].live)) {

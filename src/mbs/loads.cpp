@@ -59,7 +59,7 @@ double System::calc_owed_impulse(const CompiledLoad& k, LoadState& l) const {
   return calc_load_impulse(k, l, l.from, l.until) - l.factor * kick;
 }
 
-double System::find_load_factor(const CompiledLoad& k, LoadState& l) const {
+double System::find_load_factor(const CompiledLoad& k, LoadState& l) {
   if (l.begin == kUnlimited) return 0;
   const double owed = calc_owed_impulse(k, l) + std::exchange(l.owed, 0.0);
   // the impulse up to half a step from now that the body has not had yet; less than nothing for a load that an event of
@@ -74,8 +74,33 @@ double System::find_load_factor(const CompiledLoad& k, LoadState& l) const {
     l.factor = k.is_constant ? 1 : calc_mean(k.factor, l.from - l.begin, l.until - l.begin);
   } else {
     l.factor = (owed + calc_load_impulse(k, l, l.from, l.until)) / l.kick;
+    if (std::abs(l.factor - calc_load_factor(k, l)) > 1e-9) state.has_rest = true;
   }
   return l.factor;
+}
+
+double System::calc_load_factor(const CompiledLoad& k, const LoadState& l) const {
+  if (l.begin == kUnlimited || state.time < l.begin || state.time >= l.end) return 0;
+  return k.is_constant ? 1 : calc_force(k.factor, state.time - l.begin);
+}
+
+bool System::take_loads_as_they_are() {
+  bool is_other = false;
+  for (size_t i = 0; i < forces.loads.size(); ++i) {
+    const CompiledLoad& k = forces.loads[i];
+    const LoadState& l = state.load[i];
+    const double missing = calc_load_factor(k, l) - l.factor;
+    if (std::abs(missing) <= 1e-9) continue;
+    const Mat3 R = k.follows_body ? rotation_of(k.body) : Mat3::identity();
+    const Vec3 f = missing * (R * k.force), t = missing * (R * k.torque);
+    if (k.body >= 0 && !fixed[static_cast<size_t>(k.body)])
+      load_body(k.body, f, cross(calc_point(k.body, k.p_B) - centre_of(k.body), f) + t);
+    else
+      ground_reaction -= f;
+    is_other = true;
+  }
+  if (is_other && model.is_planar) drop_forces_across();
+  return is_other;
 }
 
 void System::evaluate_loads(bool at_rest) {

@@ -127,7 +127,16 @@ void System::close_joints() {
       }
     }
     if (c.dependent > 0) c.matrix.project(joint_rhs.data());
-    for (size_t r = 0; r < n; ++r) worst = std::max(worst, std::abs(joint_rhs[r]));
+    for (size_t i = 0; i < c.joints.size(); ++i) {
+      const CompiledJoint& j = joints[static_cast<size_t>(c.joints[i])];
+      const size_t at = static_cast<size_t>(c.matrix.first_row(static_cast<int>(i)));
+      double along2 = 0, about2 = 0;  // of its point, of its axes over the length
+      for (int r = 0; r < j.rows; ++r) {
+        const double off = joint_rhs[at + static_cast<size_t>(r)];
+        (r < j.lines ? along2 : about2) += off * off;
+      }
+      worst = std::max({worst, std::sqrt(along2), std::sqrt(about2)});
+    }
     if (!(worst > 1e-12 * fastest)) continue;
     if (worst > 1e-9 * fastest) note_speed(c, worst);
     c.matrix.solve(joint_rhs.data());

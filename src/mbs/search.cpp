@@ -388,10 +388,27 @@ void System::find_pairs() {
   s.pair_fast.swap(search.fast);
 }
 
+bool System::comes_first(int body, int shape, int other_body, int other_shape) const {
+  const size_t a = static_cast<size_t>(body), b = static_cast<size_t>(other_body);
+  if (fixed[a] != fixed[b]) return fixed[a];
+  constexpr double alike = 1e-9;
+  const auto differ = [](double x, double y) { return !(std::abs(x - y) <= alike * std::min(x, y)) && x != y; };
+  const double mass = state.body[a].mass, other_mass = state.body[b].mass;
+  if (differ(mass, other_mass)) return mass > other_mass;
+  const double reach = state.shapes[static_cast<size_t>(shape)].reach;
+  const double other_reach = state.shapes[static_cast<size_t>(other_shape)].reach;
+  if (differ(reach, other_reach)) return reach > other_reach;
+  const Vec3 at = state.p[a], other_at = state.p[b];
+  for (const int axis : {2, 0, 1})
+    if (std::abs(at[axis] - other_at[axis]) > alike) return at[axis] < other_at[axis];
+  return true;
+}
+
 PairDue System::make_pair_due(const HeldPair& pair) const {
   PairDue d;
   d.a = pair.a, d.b = pair.b;
   d.shape_a = pair.shape_a, d.shape_b = pair.shape_b;
+  if (!comes_first(d.a, d.shape_a, d.b, d.shape_b)) std::swap(d.a, d.b), std::swap(d.shape_a, d.shape_b);
   const auto is_box = [&](int i) { return state.shapes[static_cast<size_t>(i)].kind == Shape::Kind::Box; };
   d.are_boxes = is_box(d.shape_a) && is_box(d.shape_b);
   return d;

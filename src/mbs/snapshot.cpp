@@ -37,8 +37,8 @@ struct Reader : ArchiveReader {
 template <class Archive, class S, class C>
 void visit(Archive& ar, S& s, C& sys) {
   ar(s.step_index), ar(s.time), ar(s.step), ar(s.time_base), ar(s.index_base), ar(s.last_kick), ar(s.review_times),
-      ar(s.live_elements), ar(s.live_at_review), ar(s.set_step_doubted), ar(s.first_kick), ar(s.next_event),
-      ar(s.waiting), ar(s.trigger_values);
+      ar(s.live_elements), ar(s.live_at_review), ar(s.set_step_doubted), ar(s.first_kick), ar(s.has_rest),
+      ar(s.next_event), ar(s.waiting), ar(s.trigger_values);
   ar(s.body), ar(s.p), ar(s.v), ar(s.L), ar(s.w), ar(s.q), ar(s.R), ar(s.p_offset);
   ar(s.shapes), ar(s.crushed_boxes), ar(s.ground_points), ar(s.touched_ground), ar(s.ground_clear), ar(s.ground_box);
   ar(s.element), ar(s.rotational), ar(s.joint), ar(s.cable);

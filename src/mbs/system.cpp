@@ -445,6 +445,7 @@ void System::fire_events() {
     }
   }
   if (!state.waiting.empty()) find_triggered(due);
+  state.has_rest = false;
   for (const DueEvent& one : due) {
     act(one);
     state.review_times.push_back(state.time);
@@ -823,6 +824,28 @@ const View& System::calc_view() {
 void System::look() {
   unpack_elements();
   calc_reactions();
+  if (state.has_rest) {
+    // what the step needs besides is no force of now
+    const Vec3 ground = ground_reaction;
+    std::vector<std::pair<Vec3, Vec3>> of_step;
+    for (size_t b = 0; b < B; ++b) of_step.emplace_back(force[b], torque[b]);
+    if (take_loads_as_they_are()) {
+      calc_reactions();
+      see();
+      const Vec3 ground_force = view.ground_force;
+      const std::vector<Vec3> held = view.joint_force, turned = view.joint_moment;
+      ground_reaction = ground;
+      for (size_t b = 0; b < B; ++b) force[b] = of_step[b].first, torque[b] = of_step[b].second;
+      calc_reactions();
+      see();
+      view.ground_force = ground_force, view.joint_force = held, view.joint_moment = turned;
+      return;
+    }
+  }
+  see();
+}
+
+void System::see() {
   View& v = view;
   const State& s = state;
   const size_t R = rotationals.size();

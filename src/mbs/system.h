@@ -93,6 +93,7 @@ struct State {
   std::vector<double> review_times;
   size_t live_elements = 0, live_at_review = 0;
   bool set_step_doubted = false;  // it was too long at the last review
+  bool has_rest = false;          // bodies have had a rest of an impulse (F7), which the next reactions of joints undo
   size_t next_event = 0;
   std::vector<int> waiting;  // events whose time has come and that wait for a trigger, in the order of the model
   std::vector<double> trigger_values;  // at the step before, of the triggers of those that wait, in their order
@@ -217,6 +218,7 @@ class System {
   void join_batch(Lanes& batch, size_t lane);
   const View& calc_view();
   void look();  // into the view
+  void see();   // as look(), after calc_reactions
   Summary summary;
 
   // constant after compilation
@@ -334,11 +336,15 @@ class System {
   void evaluate_bushing(size_t bushing, bool at_rest);
   void evaluate_loads(bool at_rest);
   /// Share of a load's force in the next kick.
-  double find_load_factor(const CompiledLoad&, LoadState&) const;
+  double find_load_factor(const CompiledLoad&, LoadState&);
   /// Integral of a load's factor, which runs either way [s].
   double calc_load_impulse(const CompiledLoad&, const LoadState&, double from, double to) const;
   /// What the last kick lacks where the step has changed after its forces were taken [s].
   double calc_owed_impulse(const CompiledLoad&, LoadState&) const;
+  /// Of its presence now.
+  double calc_load_factor(const CompiledLoad&, const LoadState&) const;
+  /// Puts loads as of now in the place of those that give the impulse of a step; whether any of them is another.
+  bool take_loads_as_they_are();
   void evaluate_dampers();
   /// As look(), with the pulls that dampers have at the velocities of the start: what moves the bodies then is already
   /// that of the end of the first half step.
@@ -482,6 +488,9 @@ class System {
   void find_links();
   /// Makes pairs of held ones whose links have ended.
   void release_pairs();
+  /// Which of a pair is the first, whose faces are preferred: what is fixed, heavier, larger, lower. It does not hang
+  /// on what else there is, nor on the order of the model where those tell both apart.
+  bool comes_first(int body, int shape, int other_body, int other_shape) const;
   PairDue make_pair_due(const HeldPair&) const;
   void find_fast_bodies();
   void find_bounds();

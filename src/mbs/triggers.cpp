@@ -35,6 +35,10 @@ bool is_force(Quantity::Kind kind) {
   }
 }
 
+bool is_reaction(Quantity::Kind kind) {
+  return kind == Quantity::Kind::JointForce || kind == Quantity::Kind::JointMoment;
+}
+
 }  // namespace
 
 double System::calc_component(const Quantity& q, int component) {
@@ -119,7 +123,13 @@ void System::find_triggered(std::vector<DueEvent>& due) {
     double passed = kUnlimited;  // the first of those that hold
     const size_t first = kept_values;
     for (const Trigger& t : event.triggers) {
-      const double x = calc_component(t.quantity, t.component), before = state.trigger_values[value++];
+      const double before = state.trigger_values[value++];
+      // of forces nothing is known before the first step, of reactions nothing in one that undoes a rest
+      if ((state.first_kick && is_force(t.quantity.kind)) || (state.has_rest && is_reaction(t.quantity.kind))) {
+        state.trigger_values[kept_values++] = before;
+        continue;
+      }
+      const double x = calc_component(t.quantity, t.component);
       if (t.rising ? x >= t.limit : x <= t.limit) passed = std::min(passed, find_passing_time(event, t, before, x));
       state.trigger_values[kept_values++] = x;
     }
@@ -145,7 +155,7 @@ double System::find_passing_time(const Event& event, const Trigger& t, double be
   if (state.first_kick) return state.time;
   // it waits since this step: what holds now is taken to have held then
   if (before == kUnlimited) return std::min(event.time, state.time);
-  return known - find_passing(before, now, t.limit) * state.last_kick;
+  return std::max(event.time, known - find_passing(before, now, t.limit) * state.last_kick);
 }
 
 }  // namespace topple::mbs

@@ -414,19 +414,24 @@ class RandomModel {
       for (const std::string& name : outputs_)
         if (a.kind == Answer::Kind::Done && !std::binary_search(form_->outputs.begin(), form_->outputs.end(), name))
           a = refuse(name);
+      // a name of an output where that of an outcome is wanted lacks a limit
+      for (const std::string& name : outcomes_)
+        if (a.kind == Answer::Kind::Done && a.outcome != name &&
+            std::binary_search(form_->outputs.begin(), form_->outputs.end(), name))
+          a = refuse(fmt::format("statistics: {} is an output, not an outcome", product::quoted(name)),
+                     fmt::format("such as p({} > 3)", name));
     }
     if (a.kind == Answer::Kind::Refused && !refused_) refused_ = a;
     to = std::move(a);
   }
 
   Answer refuse(const std::string& name) const {
+    return refuse(fmt::format("statistics: the model has no output {}", product::quoted(name)),
+                  product::did_you_mean(name, form_->outputs, "its outputs: " + product::list_of(form_->outputs)));
+  }
+  static Answer refuse(const std::string& what, const std::string& help) {
     Refusal r;
-    r.diagnostic = {Severity::Error,
-                    "E825",
-                    {},
-                    1,
-                    fmt::format("statistics: the model has no output {}", product::quoted(name)),
-                    product::did_you_mean(name, form_->outputs, "its outputs: " + product::list_of(form_->outputs))};
+    r.diagnostic = {Severity::Error, "E825", {}, 1, what, help};
     Answer a;
     a.kind = Answer::Kind::Refused;
     a.text = write_refusal(r);

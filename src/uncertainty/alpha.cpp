@@ -702,8 +702,11 @@ class Optimisation {
       if (is_kinked && is_free) note_kinks(r.goal);
       if (is_steep(r.goal) && (!model || model->has_met_walls())) continue;
       const bool is_open = has_kinks(r.goal) ? model || !is_free : is_kinked;
-      double& end = (is_open ? edges_ : ends_).try_emplace(key_of(r.goal), infinite).first->second;
-      end = std::min(end, r.search->value());
+      const bool is_doubtful = model && model->is_doubtful() && r.goal.outcome != any_class;
+      for (auto* noted : {is_open ? &edges_ : &ends_, is_doubtful ? &doubts_ : &sure_ends_}) {
+        double& end = noted->try_emplace(key_of(r.goal), infinite).first->second;
+        end = std::min(end, r.search->value());
+      }
     }
     all.clear();
   }
@@ -788,7 +791,7 @@ class Optimisation {
   bool is_converged(const Goal& goal, const Candidate& best) const { return is_noted(ends_, goal, best); }
   /// What a bound is marked with.
   bool is_settled(const Goal& goal, const Candidate& best) const {
-    if (!is_converged(goal, best)) return false;
+    if (!is_converged(goal, best) || (is_noted(doubts_, goal, best) && !is_noted(sure_ends_, goal, best))) return false;
     if (!is_open(goal.level)) return is_scanned(goal, best) && is_explored(goal);
     return is_checked(goal, best) && (goal.outcome != any_class || is_confirmed(goal, best));
   }
@@ -1124,14 +1127,15 @@ class Optimisation {
   std::vector<int> space_points_;  // per level
   // of the boundaries of outcomes, by outcome and inputs that vary, latest last
   std::map<std::pair<int, std::vector<int>>, std::vector<Boundary::Plane>> planes_;
-  Facets facets_;                           // found before
-  std::map<int, Jumps> jumps_;              // by output
-  std::map<Key, double> ends_;              // best value at which a search converged
-  std::set<std::pair<int, bool>> kinked_;   // output and sign
-  std::map<Key, double> given_up_;          // at which searches along kinks neither ended nor gained any more
-  std::map<Key, int> in_vain_;              // searches along kinks that did not end, nor gain
-  std::map<Key, double> edges_;             // at which one stopped before a kink
-  std::map<Key, std::vector<int>> starts_;  // samples from which searches began, or at which they stopped
+  Facets facets_;                             // found before
+  std::map<int, Jumps> jumps_;                // by output
+  std::map<Key, double> ends_;                // best value at which a search converged
+  std::map<Key, double> doubts_, sure_ends_;  // at which a doubtful one did, and one that is not
+  std::set<std::pair<int, bool>> kinked_;     // output and sign
+  std::map<Key, double> given_up_;            // at which searches along kinks neither ended nor gained any more
+  std::map<Key, int> in_vain_;                // searches along kinks that did not end, nor gain
+  std::map<Key, double> edges_;               // at which one stopped before a kink
+  std::map<Key, std::vector<int>> starts_;    // samples from which searches began, or at which they stopped
   std::map<std::pair<int, bool>, std::vector<Optimum>> optima_;  // by output and sign
   std::set<std::pair<int, bool>> wavy_;                          // the same: values vary within little
   std::set<Key> steep_;                                          // output, sign, outcome: beside another one

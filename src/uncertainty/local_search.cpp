@@ -578,7 +578,8 @@ void ModelSearch::ask_trials() {
       if (region_.space->has_interaction() || is_sided) add_programmed(part);
     }
     promised_ = -calc_model(steps.back());
-    if (is_walled) along_ = std::min(along_, promised_ / std::max(-calc_model(whole), options_.tolerance));
+    if (is_walled) last_along_ = promised_ / std::max(-calc_model(whole), options_.tolerance);
+    along_ = std::min(along_, last_along_);
     // beyond planes that may be wrong
     if (is_sided)
       for (const double part : {-0.02, -0.1}) add_programmed(part);
@@ -625,7 +626,7 @@ void ModelSearch::finish_iteration() {
   // a way along the boundary may be long
   if (wall_ && (gained > 1e4 * options_.tolerance || gained > std::max(10 * options_.tolerance, 0.1 * promised_)))
     --probes_;
-  if (gained > 1e4 * options_.tolerance) along_ = 1;
+  if (gained > 1e4 * options_.tolerance) along_ = last_along_ = 1;
   const bool any_free = std::any_of(axes_.begin(), axes_.end(), [](const Axis& a) { return a.free; });
   // a plane is no more than the boundary's tangent
   const double tolerance = is_bound_ || (wall_ && wall_->found()) ? 1000 * options_.tolerance : options_.tolerance;
@@ -654,6 +655,8 @@ void ModelSearch::finish_iteration() {
     // where a boundary stops it that is not located any more, the way along it may lead on
     converged_ = settled || wall_ || probes_ < most_probes() || promised_ <= tolerance ||
                  (along_ < 0.05 && !boundary_.has_edges());
+    is_doubtful_ = !settled && farther * promised_ > tolerance && !(!is_bound_ && (wall_ || probes_ < most_probes())) &&
+                   !(last_along_ < 0.012 && !boundary_.has_edges());
     at_edge_ = !settled || is_bent();
     pending_.clear();
     if (!look_steep()) look_for_jump((settled ? 1e5 : 100) * options_.tolerance);
@@ -804,7 +807,7 @@ void ModelSearch::stay_before_jump() {
   insides_.push_back(near_), walls_.push_back(far_.x);
   is_wide_ = false;
   converged_ = at_edge_ = false;
-  probes_ = 0, along_ = 1;
+  probes_ = 0, along_ = last_along_ = 1;
   ask_star();
 }
 

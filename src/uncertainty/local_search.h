@@ -90,6 +90,8 @@ class ModelSearch : public LocalSearch {
   bool is_at_edge() const { return at_edge_; }
   /// Whether it ended where the mapping is smooth, but only within much less than its first star.
   bool is_wavy() const { return converged_ && !at_edge_ && (is_bend_checked_ || is_edge_checked_); }
+  /// Whether it ended along a boundary by short steps, where a longer way would promise more.
+  bool is_doubtful() const { return is_doubtful_; }
   /// Whether values fall ever more steeply towards the outcome that it ended beside, as roots do: stars tell nothing
   /// there.
   bool is_steep() const { return is_steep_; }
@@ -176,14 +178,14 @@ class ModelSearch : public LocalSearch {
   std::vector<double> hessian_;   // axes x axes
   double radius_, trust_;
   double promised_ = 0;
-  bool is_bound_ = false;  // by a located boundary
-  double along_ = 1;       // least part of what is promised here that a located boundary leaves
+  bool is_bound_ = false;              // by a located boundary
+  double along_ = 1, last_along_ = 1;  // part of what is promised that a located boundary leaves: the least, the last
   int iteration_ = 0, probes_ = 0;
   bool at_edge_ = false, has_met_walls_ = false;
   bool is_bend_checked_ = false;  // with a nearer star
   bool is_edge_checked_ = false;  // by another iteration at its radius
   double last_gain_ = 0, earlier_gain_ = 0;
-  bool is_steep_ = false;
+  bool is_doubtful_ = false, is_steep_ = false;
   std::optional<Point> beside_;
   double first_slope_ = 0;  // of the value, on the way to the other outcome
   enum class Stage { Star, Inner, Probe, Trial, Section, Back, Approach } stage_ = Stage::Star;

@@ -455,6 +455,38 @@ TEST(Structures, ThoseThatChargesActOnAreJudgedOneByOneTheHeaviestFirst) {
   EXPECT_NE(b.map.notes.back().text.find("Charges act on 2 separate structures (with tower, low)"), std::string::npos);
 }
 
+TEST(Structures, APauseIsThatOfThoseWithChargesToCome) {
+  std::string later = mouth("2 m", "150 deg");
+  later.replace(later.find("0.2 s"), 5, "5 s");
+  later.replace(later.find("tower"), 5, "low");
+  const record::Record r =
+      run_plan(read(tower(slender, second + mouth("2 m", "240 deg") + later, "5.2 s")), default_knowledge(), {}, {});
+  for (const record::Finding& f : r.findings)
+    if (f.id == "stability.stage_1") {
+      EXPECT_EQ(f.status, record::Status::Good) << f.text;
+      EXPECT_NE(f.text.find("Judged of what has charges to come: low."), std::string::npos) << f.text;
+      EXPECT_NE(f.text.find("Zone low/"), std::string::npos) << f.text;
+      return;
+    }
+  FAIL() << "no pause";
+}
+
+TEST(Shaft, ASliverBetweenTwoChargesBearsNothing) {
+  const auto split = [](const std::string& azimuth) {
+    return mouth("2 m", "100 deg") +
+           "[[stage.charge]]\nmembers = \"tower\"\nposition = \"2.5 m\"\ndestroyed_length = " +
+           "\"2 m\"\nazimuth = \"" + azimuth + "\"\nopening = \"100 deg\"\n";
+  };
+  const Built touching(tower(slender + strong, split("280 deg"), "1 s")),
+      apart(tower(slender + strong, split("280.01 deg"), "1 s"));
+  ASSERT_EQ(touching.model.elements.size(), apart.model.elements.size());
+  for (size_t i = 0; i < touching.model.elements.size(); ++i) {
+    const Vec3 &a = touching.model.elements[i].rotational_stiffness, &b = apart.model.elements[i].rotational_stiffness;
+    EXPECT_NEAR(a.y, b.y, 1e-3 * a.y) << touching.model.elements[i].name;
+    EXPECT_NEAR(a.z, b.z, 1e-3 * a.z) << touching.model.elements[i].name;
+  }
+}
+
 TEST(Structures, TheUpperBlockOfAShaftStandsOnItsLowestMouth) {
   std::string high = mouth("2 m", "200 deg");
   high.replace(high.find("2.5 m"), 5, "30 m");

@@ -321,5 +321,96 @@ TEST(Ending, AtTheStartGivesNothing) {
   EXPECT_LT(r.energy_error, 1e-12);
 }
 
+/// A body at (1, 0, 0) that is welded to the ground and pulled along x by 1000 N, from or until an event.
+Model make_welded(bool is_load, double limit) {
+  Model m = make_flier();
+  m.bodies[0].v_WB = {};
+  Joint weld;
+  weld.name = "weld", weld.kind = Joint::Kind::Fixed;
+  weld.parent = kGround, weld.child = {0};
+  weld.X_PF.p = {1, 0, 0};
+  weld.tension_limit = limit;
+  add_joint(m, weld);
+  if (is_load) {
+    Load l;
+    l.name = "load", l.body = {0}, l.force = {1000, 0, 0};
+    m.loads.push_back(l);
+  } else {
+    SpringDamper k;
+    k.name = "spring";
+    k.a = kGround, k.b = {0};
+    k.p_A = {3, 0, 0};
+    k.free_length = 1, k.spring.rate = 1000;
+    m.springs.push_back(k);
+  }
+  return m;
+}
+
+TEST(Ending, LeavesAJointThatHoldsWhatPulls) {
+  struct Way {
+    bool is_load, begins;
+    Action::Kind kind;
+  };
+  for (const auto& [is_load, begins, kind] :
+       {Way{true, true, Action::Kind::ApplyLoad}, Way{true, false, Action::Kind::RemoveLoad},
+        Way{false, false, Action::Kind::RemoveSpring}})
+    for (int i = 0; i < 10; ++i) {
+      const double time = 0.05 + 1e-4 * i;
+      Options o;
+      o.duration = 0.1;
+      o.step = o.frame_interval = 1e-3;
+      o.equilibrium = false;
+      double most = 0, least = 0;
+      bool is_off = false;
+      o.on_frame = [&](const View& v) {
+        most = std::max(most, v.joint_force[0].x), least = std::min(least, v.joint_force[0].x);
+        is_off |= v.joint_released[0];
+      };
+      Model m = with(make_welded(is_load, 1200), make_event(time, kind));
+      run(m, o);
+      EXPECT_FALSE(is_off) << is_load << begins << ' ' << time;
+      EXPECT_NEAR(least, -1000, 1e-6) << is_load << begins << ' ' << time;
+      EXPECT_NEAR(most, 0, 1e-6) << is_load << begins << ' ' << time;
+      // and lets go where it does not
+      is_off = false;
+      m.joints[0].tension_limit = 900;
+      run(m, o);
+      EXPECT_TRUE(is_off);
+    }
+}
+
+TEST(Ending, AtAForceThatFallsLaterWaits) {
+  // 500 N at the start, a quarter swing of 1 kg on 40 N/m: to 100 N where cos is a fifth
+  Model m = make_sprung();
+  m.bodies[0].v_WB = {};
+  m.springs[0].p_A.x = -500 / kRate;
+  m.springs[0].a = kGround;
+  const Trigger low{{Quantity::Kind::SpringForce, 0}, 0, 100, false};
+  double fired = -1;
+  Options o;
+  o.duration = 1, o.step = 1e-4;
+  o.equilibrium = false;
+  o.on_happening = [&](const Happening& h) {
+    if (h.kind == Happening::Kind::EventFired) fired = h.time;
+  };
+  run(with(m, make_event(0, Action::Kind::RemoveSpring, {low})), o);
+  EXPECT_NEAR(fired, std::acos(0.2) / kOmega, 3e-4);
+}
+
+TEST(Ending, AtAForceThatHoldsAtTheStartPullsNothingBack) {
+  Model m = make_sprung();
+  m.bodies[0].v_WB = {};
+  m.springs[0].p_A.x = -500 / kRate;
+  const Trigger high{{Quantity::Kind::SpringForce, 0}, 0, 100, true};
+  Vec3 v;
+  Options o;
+  o.duration = 0.01, o.step = 1e-3;
+  o.equilibrium = false;
+  o.on_frame = [&](const View& view) { v = view.v_WB[0]; };
+  run(with(m, make_event(0, Action::Kind::RemoveSpring, {high})), o);
+  EXPECT_LE(v.x, 1e-9);
+  EXPECT_GE(v.x, -500 * 1e-3);
+}
+
 }  // namespace
 }  // namespace topple::mbs

@@ -144,6 +144,30 @@ Model permute(const Model& m, unsigned seed, std::vector<size_t>& place) {
   return out;
 }
 
+TEST(PileReplay, WhatStandsFarAwayDoesNotChooseTheFaces) {
+  // a box that overlaps another one as deep along both of their faces, at many angles
+  for (int i = 0; i < 40; ++i) {
+    Vec3 v[2];
+    for (const bool has_other : {false, true}) {
+      Model m;
+      m.gravity = {};
+      m.contact.ground = false;
+      Body a = test::make_box("a", 2, {0.5, 0.5, 0.5}, {0, 0, 0}), b = test::make_box("b", 1, {0.5, 0.5, 0.5}, {});
+      const double turn = 0.02 + 0.04 * i, reach = 0.5 * (std::cos(turn) + std::sin(std::abs(turn)));
+      b.X_WB = {{0.45 + 0.95 * reach, 0.1, 0.3}, exp_rotation({0, turn, 0})};
+      b.v_WB = {-1, 0, -0.3};
+      add_body(m, a), add_body(m, b);
+      if (has_other) add_body(m, test::make_box("far", 1, {0.5, 0.5, 0.5}, {0, 0, 1000}));
+      Options o;
+      o.duration = 0.02, o.step = 1e-3;
+      o.equilibrium = false;
+      o.on_frame = [&](const View& view) { v[has_other] = view.v_WB[1]; };
+      run(m, o);
+    }
+    EXPECT_NEAR(norm(v[0] - v[1]), 0, 1e-9) << i;
+  }
+}
+
 TEST(PileReplay, DoesNotDependOnTheOrderOfBodies) {
   // to the bit: pairs are looked at by place, and within a stage of the step no pair sees another
   const Model m = make_pile(3, 4);

@@ -146,6 +146,12 @@ const Mistake key_mistakes[] = {
     {"E207", "bars = { count_y = 3, count_z = 3, diameter = \"20 mm\" }",
      "bars = «{ count_y = 30, count_z = 3, diameter = \"20 mm\" }»", "30 bars do not fit into the width", "thinner"},
     {"E207", "top = \"4 x 20 mm\"", "top = «\"14 x 20 mm\"»", "14 bars do not fit", ""},
+    {"E207",
+     "height = \"60 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\ncover = \"3 cm\"\nties = { diameter = \"8 mm\", spacing = "
+     "\"15 cm\", legs = 4 }\ntop = \"4 x 20 mm\"\nbottom = \"2 x 20 mm\"",
+     "height = \"10 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\ncover = \"3 cm\"\nties = { diameter = \"8 mm\", spacing = "
+     "\"15 cm\", legs = 4 }\ntop = \"4 x 20 mm\"\nbottom = «\"2 x 20 mm\"»",
+     "overlap those at the top", "thinner"},
     {"E207", "top = \"4 x 20 mm\"", "top = \"4 x 20 mm\"\nsteel_area = «\"900 cm2\"»", "more than 15 %", ""},
     {"E207", "density = \"1800 kg/m3\"\nstrength = \"5 N/mm2\"\nmodulus = \"3 GPa\"",
      "concrete = \"C25\"\nmodulus = «\"3 GPa\"»", "belongs to masonry", "leave it out"},

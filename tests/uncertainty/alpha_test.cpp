@@ -907,6 +907,35 @@ TEST(AlphaOfClasses, FollowsAThinClass) {
   }
 }
 
+TEST(AlphaPhysics, BoundsOnARoundBoundaryThatAreOffAreMarked) {
+  // the sum within a torus about an axis along x2
+  const Evaluate model = [](std::span<const Point> points, std::span<Result> out) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Point& x = points[i];
+      const double around = std::hypot(x[0] - .2, x[1] + .1) - 1.2, up = x[2] - .6;
+      out[i].state = Result::State::Done;
+      out[i].outcome = around * around + up * up < .04 ? 1 : 0;
+      out[i].values = {x[0] + x[1] + x[2]};
+    }
+  };
+  const double half = 1.2 * std::sqrt(2.0) + .2 * std::sqrt(3.0);
+  int marked = 0;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    AlphaOptions options;
+    options.seed = seed;
+    const AlphaResult r = optimise(std::vector(3, make_triangular(-2, 0, 2)), model, options, {});
+    for (const auto& c : r.classes) {
+      if (c.outcome != 1) continue;
+      const LevelBounds& l = c.outputs[0].levels.front();
+      ASSERT_EQ(l.alpha, 0);
+      EXPECT_NEAR(l.lower.value, .7 - half, (l.lower.converged ? 2e-4 : 2e-2) * 2 * half) << seed;
+      EXPECT_NEAR(l.upper.value, .7 + half, (l.upper.converged ? 2e-4 : 2e-2) * 2 * half) << seed;
+      marked += !l.lower.converged + !l.upper.converged;
+    }
+  }
+  EXPECT_GT(marked, 0);
+}
+
 AlphaResult optimise_with(std::uint64_t seed, const Evaluate& model) {
   AlphaOptions options;
   options.seed = seed;

@@ -312,7 +312,7 @@ describe("unusual studies", () => {
   it("shows no outcomes of a model that names none", async () => {
     const { page, problems, close } = await open("study-plain", makePlainStudy());
     assert.equal(await page.locator("[aria-label=Outcomes]").count(), 0);
-    assert.ok(!(await page.textContent("body")).includes("(no name)"));
+    assert.ok(!(await page.innerText("body")).includes("(no name)"));
     assert.equal(await page.locator("[data-fan]").count(), 0);
     assert.deepEqual(problems, []);
     await close();
