@@ -177,11 +177,10 @@ void read_bars(TableReader& table, Section& s) {
       s.bars.push_back({spread(i, layer.count, y), is_top ? z : -z, circle(layer.diameter), layer.diameter});
   }
   const auto overlap = [](const Bar& a, const Bar& b) {
-    return std::hypot(a.y - b.y, a.z - b.z) < 0.5 * (a.diameter + b.diameter) - 1e-9;
+    return a.z != b.z && std::hypot(a.y - b.y, a.z - b.z) < 0.5 * (a.diameter + b.diameter) - 1e-9;
   };
-  if (!table.has("bars") &&
-      std::any_of(s.bars.begin(), s.bars.end(), [&](const Bar& a) {
-        return std::any_of(s.bars.begin(), s.bars.end(), [&](const Bar& b) { return &a != &b && overlap(a, b); });
+  if (!table.has("bars") && std::any_of(s.bars.begin(), s.bars.end(), [&](const Bar& a) {
+        return std::any_of(s.bars.begin(), s.bars.end(), [&](const Bar& b) { return overlap(a, b); });
       }))
     table.error("E207", table.place_of("bottom"), "bottom: its bars overlap those at the top",
                 "make the section higher, the cover less, or the bars thinner");
