@@ -317,9 +317,12 @@ Standing add_stability(const Context& c) {
   };
   if (block.empty()) return out;
   describe("stability.start", "Before the first charge", 0, false, 0);
+  std::vector<size_t> fired;
   for (size_t s = 0; s + 1 < stages.size(); ++s) {
-    const double begin = stages[s].last, end = stages[s + 1].first;
+    const double end = stages[s + 1].first;
     look_at_those_to_stand(end);
+    fired.push_back(stages[s].stage);
+    const double begin = find_last_charge(c.plan, c.map, counts, fired);
     const size_t i = find_frame(block, end);
     const std::string id = fmt::format("stability.stage_{}", s + 1),
                       title = fmt::format("Between \"{}\" and \"{}\"", c.stage_name(stages[s].stage),

@@ -1,6 +1,7 @@
 #include "collapse/stability.h"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 
 namespace topple::collapse {
@@ -23,24 +24,50 @@ std::vector<MemberMargin> find_margins(const record::Record& r, size_t frame, co
   return out;
 }
 
-std::vector<bool> find_structures_to_stand(const product::Plan& plan, const ModelMap& map, double from) {
-  const size_t S = map.structures.size();
-  if (S < 2) return std::vector<bool>(S, true);
-  std::vector<bool> out(S, false);
+namespace {
+
+/// Structures that a charge acts on.
+std::vector<bool> find_structures_of(const product::Plan& plan, const ModelMap& map, const Firing& f) {
+  const product::Charge& c = plan.stages[static_cast<size_t>(f.stage)].charges[static_cast<size_t>(f.charge)];
+  const std::string& member = plan.members[static_cast<size_t>(c.member)].name;
+  std::vector<bool> out(map.structures.size(), false);
   const auto mark = [&](int body) {
     if (body < 0) return;
     const int structure = map.bodies[static_cast<size_t>(body)].structure;
     if (structure >= 0) out[static_cast<size_t>(structure)] = true;
   };
+  for (const auto* list : {&map.elements, &map.rotationals, &map.joints})
+    for (const ZoneEntry& z : *list)
+      if (z.member == member) mark(z.body_a), mark(z.body_b);
+  return out;
+}
+
+}  // namespace
+
+std::vector<bool> find_structures_to_stand(const product::Plan& plan, const ModelMap& map, double from) {
+  const size_t S = map.structures.size();
+  if (S < 2) return std::vector<bool>(S, true);
+  std::vector<bool> out(S, false);
   for (const Firing& f : map.schedule) {
     if (f.time < from - 1e-9) continue;
-    const product::Charge& c = plan.stages[static_cast<size_t>(f.stage)].charges[static_cast<size_t>(f.charge)];
-    const std::string& member = plan.members[static_cast<size_t>(c.member)].name;
-    for (const auto* list : {&map.elements, &map.rotationals, &map.joints})
-      for (const ZoneEntry& z : *list)
-        if (z.member == member) mark(z.body_a), mark(z.body_b);
+    const std::vector<bool> on = find_structures_of(plan, map, f);
+    for (size_t s = 0; s < S; ++s)
+      if (on[s]) out[s] = true;
   }
   return std::find(out.begin(), out.end(), true) != out.end() ? out : std::vector<bool>(S, true);
+}
+
+double find_last_charge(const product::Plan& plan, const ModelMap& map, const std::vector<bool>& counts,
+                        const std::vector<size_t>& stages) {
+  double last = -std::numeric_limits<double>::infinity();
+  for (const Firing& f : map.schedule) {
+    if (f.fails || std::find(stages.begin(), stages.end(), static_cast<size_t>(f.stage)) == stages.end()) continue;
+    const std::vector<bool> on = find_structures_of(plan, map, f);
+    bool is_counted = counts.size() < 2;
+    for (size_t s = 0; s < on.size(); ++s) is_counted |= on[s] && counts[s];
+    if (is_counted) last = std::max(last, f.time);
+  }
+  return last;
 }
 
 std::vector<bool> find_zones_of(const std::vector<bool>& structures, const ModelMap& map, const record::Record& r) {

@@ -59,7 +59,8 @@ std::vector<int> list_open(const Problem& p, const StudyResult& r, const uncerta
                            const std::vector<std::string>& outputs) {
   std::vector<int> open;
   for (int k = 0; k < std::ssize(p.limits); ++k)
-    if (const auto c = read_limit(p, r, archive, outputs, k); c && !c->converged) open.push_back(k);
+    if (p.limits[static_cast<std::size_t>(k)].is_searched)
+      if (const auto c = read_limit(p, r, archive, outputs, k); c && !c->converged) open.push_back(k);
   return open;
 }
 
@@ -68,6 +69,7 @@ std::vector<int> list_open(const Problem& p, const StudyResult& r, const uncerta
 bool is_broken(const Limit& limit, double value, double left) {
   switch (limit.kind) {
     case Limit::Kind::Reach:
+    case Limit::Kind::Direction:
       return value + left > limit.least;
     case Limit::Kind::Clearance:
       return value - left < limit.least;
@@ -140,7 +142,8 @@ void read_limits(StudyResult& r, const Problem& p, const uncertainty::Archive& a
                  const std::vector<std::string>& outputs) {
   std::vector<Possibility> all;
   for (int k = 0; k < std::ssize(p.limits); ++k)
-    if (const auto c = read_limit(p, r, archive, outputs, k)) all.push_back(*c);
+    if (p.limits[static_cast<std::size_t>(k)].is_searched)
+      if (const auto c = read_limit(p, r, archive, outputs, k)) all.push_back(*c);
   r.limits = std::move(all);
 }
 

@@ -53,6 +53,25 @@ void tie(uncertainty::Space& space, const product::FuzzyPlan& plan) {
     };
 }
 
+struct LateCharge {
+  std::size_t stage = 0;
+  double after = 0;  // the last stage [s]
+};
+/// A charge that fires when the runs of a study have ended.
+std::optional<LateCharge> find_late_charge(const product::Plan& sample, double end) {
+  const double release = sample.stages.empty() ? 0 : sample.stages.back().time;
+  for (std::size_t i = 0; i < sample.stages.size(); ++i)
+    for (const product::Charge& c : sample.stages[i].charges)
+      if (const double late = sample.stages[i].time + c.delay - release; !c.fails && late >= end)
+        return LateCharge{i, late};
+  return std::nullopt;
+}
+std::string tell_late_charge(const LateCharge& late, const std::string& with, double end) {
+  return fmt::format(
+      "a charge of stage {} fires {:g} s after the last stage{}, when the runs of a study have ended ({:g} s)",
+      late.stage + 1, late.after, with, end);
+}
+
 }  // namespace
 
 const std::vector<std::string>& plan_outcomes() {
@@ -136,18 +155,10 @@ struct PlanMapping::Impl {
 
 void PlanMapping::check_firing(const product::Plan& plan, const Impl& impl) {
   const auto check = [&](const product::Plan& sample, const std::string& with, const SourcePosition& where) {
-    const double release = sample.stages.empty() ? 0 : sample.stages.back().time;
-    for (size_t i = 0; i < sample.stages.size(); ++i)
-      for (const product::Charge& c : sample.stages[i].charges) {
-        const double late = sample.stages[i].time + c.delay - release;
-        if (c.fails || late < impl.options.after) continue;
-        throw InputError({{Severity::Error, "E407", where, 1,
-                           fmt::format("a charge of stage {} fires {:g} s after the last stage{}, when the runs of a "
-                                       "study have ended ({:g} s)",
-                                       i + 1, late, with, impl.options.after),
-                           plan.fuzzy.search.after > 0 ? "raise after in [fuzzy.search], or leave it out"
-                                                       : "raise duration in [analysis]"}});
-      }
+    if (const auto late = find_late_charge(sample, impl.options.after))
+      throw InputError({{Severity::Error, "E407", where, 1, tell_late_charge(*late, with, impl.options.after),
+                         plan.fuzzy.search.after > 0 ? "raise after in [fuzzy.search], or leave it out"
+                                                     : "raise duration in [analysis]"}});
   };
   check(plan, "", {plan.path, 0, 0});
   // no sample fires at other times than the plan does
@@ -248,13 +259,16 @@ PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k
     constexpr int most = 20;
     for (int tries = 0; tries < most && !sample; ++tries) {
       try {
-        if (product::is_possible(plan.fuzzy, off)) sample = product::make_sample(impl->sampler, off);
+        // it need not be possible: constraints may leave no point off the middle
+        sample = product::make_sample(impl->sampler, off);
       } catch (const InputError&) {
         // below
       }
       for (size_t i = 0; i < off.size(); ++i) off[i] = 0.5 * (off[i] + centre[i]);
     }
-    if (!sample) sample = product::make_sample(impl->sampler, centre);
+    if (!sample)
+      throw InputError("E206", "the plan cannot be condensed: no values beside the core are a plan",
+                       "run the study without --condensed");
     const product::Plan* both[] = {&plan, &*sample};
     impl->condensation = collapse::find_like_frames(both, k);
     if (!impl->condensation.refusal.empty())
@@ -326,7 +340,13 @@ void PlanMapping::Impl::evaluate_chunk(std::span<const Point> points, std::span<
   for (size_t i = 0; i < points.size(); ++i) {
     out[i] = {};
     try {
-      plans.push_back(product::make_sample(sampler, points[i]));
+      product::Plan sample = product::make_sample(sampler, points[i]);
+      if (const auto late = find_late_charge(sample, options.after)) {
+        out[i].state = Result::State::Failed;
+        out[i].text = tell_late_charge(*late, "", options.after);
+        continue;
+      }
+      plans.push_back(std::move(sample));
       index.push_back(i);
     } catch (const InputError& e) {
       out[i].state = Result::State::Failed;

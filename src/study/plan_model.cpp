@@ -150,6 +150,25 @@ void list_debris_limits(const product::Plan& plan, const PlanMappingOptions& opt
   }
 }
 
+/// The planned direction of fall, with the rules' tolerance [rad] where the plan has none; that the building stands
+/// between stages is the outcome "early".
+void list_direction_limit(const product::Plan& plan, const PlanMappingOptions& options, double usual, Problem& p) {
+  if (!plan.criteria.azimuth) return;
+  const double most = plan.criteria.azimuth_tolerance.value_or(usual);
+  if (has_clearances(options))
+    p.limits.push_back({"azimuth_deviation",
+                        "",
+                        most,
+                        most,
+                        "of the plan",
+                        Limit::Kind::Direction,
+                        {},
+                        std::numeric_limits<double>::infinity(),
+                        false});
+  else
+    p.not_judged.emplace_back("azimuth");
+}
+
 /// Adds limits of ground vibration at the neighbours' foundations, over the frequencies in which the ground answers.
 void list_vibration_limits(const product::Plan& plan, std::vector<Limit>& out) {
   for (std::size_t i = 0; i < plan.neighbours.size(); ++i) {
@@ -295,7 +314,7 @@ Problem make_plan_problem(const product::Plan& asked, const PlanMappingOptions& 
   p.site = make_site(plan);
   p.not_modelled = collapse::not_modelled(plan);
   list_debris_limits(plan, options, p);
-  p.horizon = {"touchdown", "stands", options.after};
+  if (!plan.stages.empty()) p.horizon = {"touchdown", "stands", options.after};
   p.space = mapping.space();
   if (!p.derived.empty())
     p.calc_derived = [fuzzy = plan.fuzzy](const Point& x) { return product::calc_derived(fuzzy, x); };
@@ -325,6 +344,7 @@ Problem make_plan_problem(const product::Plan& asked, const PlanMappingOptions& 
     p.identity = identity.dump();
     list_vibration_limits(plan, p.limits);
   }
+  list_direction_limit(plan, options, read_rules(rules).mechanism_direction_tolerance, p);
   if (options.condensed) {
     PlanMappingOptions whole = options;
     whole.condensed = whole.vibration = whole.sideways = false;

@@ -52,6 +52,7 @@ struct Limit {
     Screening,  // stays below it
     Reach,      // is at most it
     Clearance,  // is at least it
+    Direction,  // is at most it
   };
   std::string output;          // its name
   std::string place;           // for people: a neighbour; empty: none
@@ -62,6 +63,7 @@ struct Limit {
   std::string left = {};
   /// Upper end of a screening's band from which the whole band lies above the limit.
   double above = std::numeric_limits<double>::infinity();
+  bool is_searched = true;  // else what breaks it is read off the runs
 };
 
 /// When runs of a plan end. One whose `output` says just that time, and whose outcome is not `unless`, ended before

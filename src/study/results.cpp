@@ -265,6 +265,8 @@ const char* name_of_kind(Limit::Kind kind) {
       return "reach";
     case Limit::Kind::Clearance:
       return "clearance";
+    case Limit::Kind::Direction:
+      return "direction";
     case Limit::Kind::Screening:
       break;
   }

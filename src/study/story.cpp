@@ -155,6 +155,14 @@ int count_unfinished(const Problem& p, const StudyResult& r) {
   return static_cast<int>(std::count_if(all.begin(), all.end(), is_unfinished));
 }
 
+/// Whether a run of a plan ended while parts still moved, with an outcome that is not the last word.
+bool may_change(const Problem& p, const StudyResult& r, const uncertainty::Sample& run, const std::string& outcome) {
+  if (!p.horizon || (outcome != p.horizon->unless && outcome != "partial")) return false;
+  const auto at = std::find(r.outputs.begin(), r.outputs.end(), "way_left");
+  const auto index = static_cast<std::size_t>(at - r.outputs.begin());
+  return at != r.outputs.end() && index < run.result.values.size() && run.result.values[index] > 0;
+}
+
 /// A sentence that says that all is well does not, where runs ended in the middle.
 void doubt(const Problem& p, const StudyResult& r, Sentence& s) {
   const int unfinished = count_unfinished(p, r);
@@ -184,8 +192,9 @@ Sentence tell_debris_limit(const Problem& p, const StudyResult& r, const LimitFi
   Sentence s;
   const Limit& limit = p.limits[static_cast<std::size_t>(f.limit)];
   const Quantity q = find_output(p, limit.output);
-  const std::string what =
-      limit.kind == Limit::Kind::Reach ? "Reach of the debris" : "Clearance of " + quoted(limit.place);
+  const std::string what = limit.kind == Limit::Kind::Reach       ? "Reach of the debris"
+                           : limit.kind == Limit::Kind::Direction ? "Deviation from the planned direction of fall"
+                                                                  : "Clearance of " + quoted(limit.place);
   s.text = fmt::format("{}: between {} and {}; {} of {} runs keep the limit of {} ({}). ", what,
                        words_of_number(f.least / q.unit_value), words_of_value(q, f.most), f.runs - f.broken, f.runs,
                        words_of_value(q, limit.least), limit.source);
@@ -513,7 +522,8 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
       is_searched = is_searched && c.converged;
     }
     std::string text = fmt::format("With the core values the outcome is {}", quoted(name));
-    Status status = Status::Info;
+    // whatever is asked for, as topple run has it
+    Status status = p.horizon && (name == "early" || name == "wrong direction") ? Status::Bad : Status::Info;
     if (!p.asked.empty()) {
       text += name == p.asked ? ", as planned" : fmt::format(", not {} as planned", quoted(p.asked));
       status = name == p.asked ? Status::Good : Status::Bad;
@@ -537,6 +547,10 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
           ". No other outcome was found in {} runs; an outcome that takes up {} of the inputs' support "
           "would have been missed with a probability of 5 %.",
           runs, words_of_most(100 * (1 - std::pow(0.05, 1.0 / spread)), 0) + " %");
+    }
+    if (may_change(p, r, *core, name)) {
+      text += " With the core values parts still moved when the run ended: what it was called then may become another.";
+      if (status != Status::Info) status = Status::Warning;
     }
     add("verdict", std::move(text), status);
   } else if (std::string text = tell_outputs(p, r, *core); !text.empty()) {

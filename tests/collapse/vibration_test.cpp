@@ -369,6 +369,24 @@ TEST(Margins, AreListedByMemberLowestFirst) {
   EXPECT_NEAR(m[1].margin, 2, 1e-12);
 }
 
+TEST(StabilityRun, AChargeThatFailsIsNotTheLastOfAPause) {
+  const auto run_with = [](const std::string& more) {
+    return run_plan(read(house(charge("C-A1-0", "0.1 s") + more + charge("C-B2-0", "0.8 s"), "0.85 s")),
+                    default_knowledge(), {}, {});
+  };
+  const auto failing = [](const std::string& delay) {
+    return "[[stage.charge]]\nmembers = \"C-A2-0\"\nposition = \"1 m\"\ndestroyed_length = \"1 m\"\nfails = "
+           "true\ndelay = \"" +
+           delay + "\"\n";
+  };
+  const record::Record plain = run_with("");
+  for (const char* delay : {"0.6 s", "0.69 s"}) {
+    const record::Record r = run_with(failing(delay));
+    EXPECT_EQ(finding(r, "stability.stage_1").text, finding(plain, "stability.stage_1").text) << delay;
+    EXPECT_EQ(finding(r, "stability.stage_1").status, finding(plain, "stability.stage_1").status) << delay;
+  }
+}
+
 TEST(StabilityRunPhysics, WhatGivesWayUsesItsResistanceAndWhatFallsHasNoMargin) {
   // both rows yield, soften and break on the way down
   const record::Record r =

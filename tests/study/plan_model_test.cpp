@@ -167,29 +167,33 @@ TEST(PlanModel, OutlinesTheBuildingAsItIs) {
 
 TEST(PlanModel, JudgesReachAndClearances) {
   const Problem p = make_plan_problem(read_limited("3 m"), quick());
-  ASSERT_EQ(p.limits.size(), 2u);
+  ASSERT_EQ(p.limits.size(), 3u);
   EXPECT_EQ(p.limits[0].output, "debris_reach");
   EXPECT_EQ(p.limits[0].least, 12);
   EXPECT_EQ(p.limits[0].kind, Limit::Kind::Reach);
   EXPECT_EQ(p.limits[1].output, "clearance_house");
   EXPECT_EQ(p.limits[1].least, 3);
   EXPECT_EQ(p.limits[1].kind, Limit::Kind::Clearance);
+  EXPECT_EQ(p.limits[2].output, "azimuth_deviation");
+  EXPECT_EQ(p.limits[2].kind, Limit::Kind::Direction);
+  EXPECT_TRUE(p.limits[2].left.empty());
+  EXPECT_FALSE(p.limits[2].is_searched);
   EXPECT_THAT(p.not_judged, testing::IsEmpty());
   for (const Limit& limit : p.limits)
-    for (const std::string& output : {limit.output, limit.left})
+    for (const std::string& output : {limit.output, limit.left.empty() ? limit.output : limit.left})
       EXPECT_EQ(std::count_if(p.outputs.begin(), p.outputs.end(), [&](const Quantity& q) { return q.name == output; }),
                 1)
           << output;
   // whether something lands there is not in the number
   const Problem zero = make_plan_problem(read_limited("0 m"), quick());
-  EXPECT_EQ(zero.limits.size(), 1u);
+  EXPECT_EQ(zero.limits.size(), 2u);
   EXPECT_THAT(zero.not_judged, testing::ElementsAre("clearance: \"House\""));
   // runs that know nothing across the frames
   PlanMappingOptions in_plane = quick();
   in_plane.sideways = false;
   const Problem slice = make_plan_problem(read_limited("3 m"), in_plane);
   EXPECT_THAT(slice.limits, testing::IsEmpty());
-  EXPECT_THAT(slice.not_judged, testing::ElementsAre("debris_reach", "clearance: \"House\""));
+  EXPECT_THAT(slice.not_judged, testing::ElementsAre("debris_reach", "clearance: \"House\"", "azimuth"));
 }
 
 TEST(PlanModel, TakesLimitsOfClearances) {
@@ -217,7 +221,7 @@ TEST(PlanModel, ReadsDefinitionsOfEarlierVersions) {
   const Problem old = read_plan_problem(make_model_definition(p));
   for (const Quantity& q : old.outputs) EXPECT_NE(q.name, "heap_height");
   EXPECT_THAT(old.limits, testing::IsEmpty());
-  EXPECT_THAT(old.not_judged, testing::SizeIs(2));
+  EXPECT_THAT(old.not_judged, testing::SizeIs(3));
 }
 
 TEST(PlanModel, StopsAtACancellation) {
