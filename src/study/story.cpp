@@ -20,6 +20,8 @@
 namespace topple::study {
 namespace {
 
+constexpr const char* kNearCore = "values within a hundredth of their range of the core";
+
 using record::Status;
 using uncertainty::failed_outcome;
 
@@ -86,6 +88,13 @@ std::string tell_impossible(const std::string& what, long runs, std::size_t of_r
   return text;
 }
 
+/// What leads to something, beside the core.
+std::string tell_least_change(const Problem& p, const Point& x) {
+  const std::string words = words_of_point(p, x);
+  return words == kNearCore ? " It takes no more than values within a hundredth of their range of the core."
+                            : fmt::format(" It takes no more than {}.", words);
+}
+
 std::string tell_end_of_search(bool is_converged) {
   return is_converged ? " A search ended there, and found nothing more possible."
                       : " No search has ended there, so it may be higher.";
@@ -115,7 +124,7 @@ void tell_outcomes(const Problem& p, const StudyResult& r, std::vector<Sentence>
                          words_of_possibility(c.possibility), c.possibility >= 1 ? "" : "at least ",
                          words_of_least(c.possibility), words_of_most(necessity));
     if (c.sample >= 0 && core && uncertainty::outcome_of(core->result) != c.outcome)
-      s.text += fmt::format(" It takes no more than {}.", words_of_point(p, r.alpha.archive[c.sample].x));
+      s.text += tell_least_change(p, r.alpha.archive[c.sample].x);
     if (!p.asked.empty())
       s.status = name == p.asked ? Status::Good : c.possibility >= 0.5 ? Status::Bad : Status::Warning;
     out.push_back(std::move(s));
@@ -184,7 +193,7 @@ std::string tell_breaking(const Problem& p, const StudyResult& r, const LimitFin
                    : fmt::format("It is {} that the limit is broken: possibility at least {}.", word, least);
   if (f.is_core_broken) return text;
   if (possibility < 1) text += tell_end_of_search(f.found.converged);
-  return text + fmt::format(" It takes no more than {}.", words_of_point(p, r.alpha.archive[f.found.sample].x));
+  return text + tell_least_change(p, r.alpha.archive[f.found.sample].x);
 }
 
 /// What lies between which values, how many runs keep it, and how possible it is that it is broken.
@@ -340,7 +349,7 @@ void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Senten
                   : fmt::format("Keeping it is {}: possibility at least {}.", word, least);
     if (found.possibility < 1) s.text += tell_end_of_search(is_searched);
     if (found.outcome == failed_outcome) s.text += " The run with this possibility failed.";
-    s.text += fmt::format(" It takes no more than {}.", words_of_point(p, r.alpha.archive[found.sample].x));
+    s.text += tell_least_change(p, r.alpha.archive[found.sample].x);
   } else if (runs > 0) {
     s.text += tell_impossible(what, runs, all, is_searched);
   } else {
@@ -437,7 +446,7 @@ std::string words_of_point(const Problem& p, const Point& x) {
                 ? fmt::format(" (core {} to {})", shown(f.core().left), shown(f.core().right))
                 : fmt::format(" (core {})", shown(f.centre()));
   }
-  return text.empty() ? "values within a hundredth of their range of the core" : text;
+  return text.empty() ? kNearCore : text;
 }
 
 std::vector<Split> find_splits(const uncertainty::Space& space, const uncertainty::Archive& archive,
