@@ -17,6 +17,7 @@ namespace {
 constexpr const char* kSixComponents = "six-component element";
 constexpr const char* kHinge = "revolute joint + rotational element";
 constexpr const char* kRigid = "rigid joint";
+constexpr double kCrushedThrough = 0.95;  // of a column: at its end both ends meet, and the chord has no direction
 constexpr double kLeastFootShare = 0.2;  // of the head's moment, at a charge near or above the middle of a column
 
 double largest_moment(const mbs::MomentFamily& f) {
@@ -429,7 +430,7 @@ void Builder::connect_column(const GridPoint& at, int index) {
                   {s.GJ / L, s.uncracked_EI_y / L, s.uncracked_EI_z / L},
                   order_stations(z, s, m.name, bending_of_column()), calc_cracking(z, s, L / 6, L / 6))
           .index;
-  model.elements.back().crush_through = L;
+  model.elements.back().crush_through = kCrushedThrough * L;
 }
 
 void Builder::connect_x_beam(const GridPoint& at, int index) {

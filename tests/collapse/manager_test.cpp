@@ -950,5 +950,17 @@ TEST(ManagerPhysics, TheStorehouseStandsStillUnderDeadLoad) {
   EXPECT_LT(s.equilibrium_residual, 1e-6);
 }
 
+TEST(Manager, AColumnIsNotCrushedUntilItsEndsMeet) {
+  ModelMap map;
+  const mbs::Model model = make_model(read(house(charge("C-A*-0"))), default_knowledge(), map);
+  int members = 0;
+  for (const mbs::ZoneElement& e : model.elements) {
+    if (e.stations.size() < 2 || !(e.crush_through > 0)) continue;
+    EXPECT_LT(e.crush_through, 0.96 * std::abs(e.stations[1].x - e.stations[0].x)) << e.name;
+    ++members;
+  }
+  EXPECT_GT(members, 0);
+}
+
 }  // namespace
 }  // namespace topple::collapse
