@@ -101,8 +101,11 @@ TEST(Manager, ColumnsCanBeCrushedOverTheirClearLength) {
       EXPECT_EQ(e.crush_through, 0) << e.name;
       continue;
     }
-    // storeys of 3.14 m under beams of 0.7 m
-    EXPECT_NEAR(e.crush_through, 2.44, 1e-9) << e.name;
+    // storeys of 3.14 m under beams of 0.7 m; both ends of a member do not meet
+    EXPECT_NEAR(e.crush_through, (e.stations.size() < 2 ? 1 : 0.95) * 2.44, 1e-9) << e.name;
+    if (e.stations.size() == 2) {
+      EXPECT_LT(e.crush_through, 0.96 * std::abs(e.stations[1].x - e.stations[0].x)) << e.name;
+    }
     const mbs::ZoneLaw& law = b.model.laws[static_cast<size_t>(e.stations[0].law.index)];
     EXPECT_LT(law.crush_length, 0.5) << e.name;
     ++columns;
@@ -948,18 +951,6 @@ TEST(ManagerPhysics, TheStorehouseStandsStillUnderDeadLoad) {
   EXPECT_LT(moved, 1e-5);  // a hundredth of the millimetre that is allowed in 10 s
   EXPECT_EQ(yielded, 0);
   EXPECT_LT(s.equilibrium_residual, 1e-6);
-}
-
-TEST(Manager, AColumnIsNotCrushedUntilItsEndsMeet) {
-  ModelMap map;
-  const mbs::Model model = make_model(read(house(charge("C-A*-0"))), default_knowledge(), map);
-  int members = 0;
-  for (const mbs::ZoneElement& e : model.elements) {
-    if (e.stations.size() < 2 || !(e.crush_through > 0)) continue;
-    EXPECT_LT(e.crush_through, 0.96 * std::abs(e.stations[1].x - e.stations[0].x)) << e.name;
-    ++members;
-  }
-  EXPECT_GT(members, 0);
 }
 
 }  // namespace
