@@ -18,7 +18,7 @@ constexpr const char* kSixComponents = "six-component element";
 constexpr const char* kHinge = "revolute joint + rotational element";
 constexpr const char* kRigid = "rigid joint";
 constexpr double kCrushedThrough = 0.95;  // of a column: at its end both ends meet, and the chord has no direction
-constexpr double kLeastFootShare = 0.2;  // of the head's moment, at a charge near or above the middle of a column
+constexpr double kLeastFootShare = 0.2;   // of the head's moment, at a charge near or above the middle of a column
 
 double largest_moment(const mbs::MomentFamily& f) {
   double m = 0;
