@@ -537,6 +537,9 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
       text += name == p.asked ? ", as planned" : fmt::format(", not {} as planned", quoted(p.asked));
       status = name == p.asked ? Status::Good : Status::Bad;
     }
+    // it may become another one; that others are possible weighs as before
+    const bool is_open = may_change(p, r, *core, name);
+    if (is_open && status != Status::Info) status = Status::Warning;
     if (others > 0) {
       text += fmt::format(
           ". It is not certain: another outcome is {} (possibility at least {}), so its necessity "
@@ -557,10 +560,8 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
           "would have been missed with a probability of 5 %.",
           runs, words_of_most(100 * (1 - std::pow(0.05, 1.0 / spread)), 0) + " %");
     }
-    if (may_change(p, r, *core, name)) {
+    if (is_open)
       text += " With the core values parts still moved when the run ended: what it was called then may become another.";
-      if (status != Status::Info) status = Status::Warning;
-    }
     add("verdict", std::move(text), status);
   } else if (std::string text = tell_outputs(p, r, *core); !text.empty()) {
     add("verdict", std::move(text));
