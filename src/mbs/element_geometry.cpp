@@ -33,6 +33,12 @@ Vec3 find_half_tangent(const Vec3& h) {
   return 0.5 / q.w * Vec3{q.x, q.y, q.z};
 }
 
+/// The least rotation that takes x to the unit vector e.
+Quat find_least_rotation(const Vec3& e) {
+  const double w = std::sqrt(std::max(0.5 * (1 + e.x), 1e-30));
+  return {w, 0, -0.5 * e.z / w, 0.5 * e.y / w};
+}
+
 }  // namespace
 
 ElementGeometry measure_element(const Pose& X_WF, const Pose& X_WM, const Span& span) {
@@ -49,23 +55,26 @@ ElementGeometry measure_element(const Pose& X_WF, const Pose& X_WM, const Span& 
     for (int i = 0; i < 3; ++i) deformation[i] = g.way[i], deformation[3 + i] = turn[i];
     return g;
   }
+  const Mat3 M = to_matrix(X_WM.q);
   g.p_a = X_WF.p + span.a * F.column(0);
-  g.p_b = X_WM.p + span.b * to_matrix(X_WM.q).column(0);
-  const Vec3 chord = transpose_times(F, g.p_b - g.p_a);
+  g.p_b = X_WM.p + span.b * M.column(0);
+  const Vec3 chord = g.p_b - g.p_a;
   g.length = norm(chord);
-  const Vec3 e = (1 / g.length) * chord;
-  g.along_a = e;
-  // the least rotation from x of a to the chord
-  const double w = std::sqrt(std::max(0.5 * (1 + e.x), 1e-30));
-  const Quat swing{w, 0, -0.5 * e.z / w, 0.5 * e.y / w};
-  const Quat q_WC = X_WF.q * swing;
-  g.axes = to_matrix(q_WC);
-  g.turn_a = log_rotation(swing);
-  g.turn_b = log_rotation(conjugate(q_WC) * X_WM.q);
+  // the ends with their x laid along the chord, and the twist from one to the other
+  const Quat swing_a = find_least_rotation((1 / g.length) * transpose_times(F, chord));
+  const Quat swing_b = find_least_rotation((1 / g.length) * transpose_times(M, chord));
+  const Quat laid_a = X_WF.q * swing_a, apart = conjugate(laid_a) * (X_WM.q * swing_b);
+  const double sign = apart.w < 0 ? -1 : 1, cosine = sign * apart.w, sine = sign * apart.x;
+  const double per_length = 1 / std::hypot(1 + cosine, sine);
+  g.axes = to_matrix(laid_a * Quat{per_length * (1 + cosine), per_length * sine, 0, 0});
+  const auto roll = [&](const Vec3& v, double s) { return Vec3{0, cosine * v.y - s * v.z, cosine * v.z + s * v.y}; };
+  g.turn_a = roll(log_rotation(swing_a), -sine);
+  g.turn_b = roll(-log_rotation(swing_b), sine);
   deformation[0] = g.length - span.length();
   deformation[1] = -(span.a * g.turn_a.z + span.b * g.turn_b.z);
   deformation[2] = span.a * g.turn_a.y + span.b * g.turn_b.y;
-  for (int i = 0; i < 3; ++i) deformation[3 + i] = g.turn_a[i] + g.turn_b[i];
+  deformation[3] = 2 * std::atan2(sine, cosine);
+  for (int i = 1; i < 3; ++i) deformation[3 + i] = g.turn_a[i] + g.turn_b[i];
   return g;
 }
 
@@ -82,15 +91,16 @@ ElementForces calc_element_forces(const ElementGeometry& g, const Six& resultant
   }
   // moments at both stations; what they leave between them is the shear across the chord
   const Vec3 m_a{0, f[4] + span.a * f[2], f[5] - span.a * f[1]};
-  const Vec3 m_b{f[3], f[4] + span.b * f[2], f[5] - span.b * f[1]};
+  const Vec3 m_b{0, f[4] + span.b * f[2], f[5] - span.b * f[1]};
   const Vec3 on_a = calc_conjugate_torque(-g.turn_a, m_a);  // as seen from the chord
   const Vec3 on_b = calc_conjugate_torque(g.turn_b, m_b);
-  const Vec3 left = on_a - on_b;
-  // the chord turns with a about the line halfway between both, which hands the torsion over
-  const double handed = left.x / (1 + g.along_a.x);
-  const double y = handed * g.along_a.y, z = handed * g.along_a.z;
-  const Vec3 force{f[0], (left.z + z) / g.length, -(left.y + y) / g.length};
-  return {g.axes * force, g.axes * Vec3{on_b.x, on_a.y + y, on_a.z + z}, g.axes * on_b};
+  // an end that is laid along the chord turns with it about the line halfway between both, which hands the torsion over
+  const Vec3 t_a = 2 * find_half_tangent(g.turn_a), t_b = 2 * find_half_tangent(g.turn_b);
+  const double from_a = f[3] + on_b.x, from_b = f[3] + on_a.x, torsion = from_a + on_a.x;
+  const Vec3 torque_a{torsion, on_a.y - from_a * t_a.z, on_a.z + from_a * t_a.y};
+  const Vec3 torque_b{torsion, on_b.y + from_b * t_b.z, on_b.z - from_b * t_b.y};
+  const Vec3 left = torque_a - torque_b;
+  return {g.axes * Vec3{f[0], left.z / g.length, -left.y / g.length}, g.axes * torque_a, g.axes * torque_b};
 }
 
 }  // namespace topple::mbs

@@ -28,12 +28,11 @@ struct Span {
 
 struct ElementGeometry {
   Span span;
-  Six deformation;      // [m], [rad]
-  Mat3 axes;            // of the resultants, in W; without a member halfway between F and M
-  Vec3 p_a, p_b;        // where the force acts on a and on b, in W
-  Vec3 turn_a, turn_b;  // rotation vectors from a to `axes` and on to b, in `axes`
+  Six deformation;  // [m], [rad]
+  Mat3 axes;        // of the resultants, in W; halfway between F and M, of a member between both laid along its chord
+  Vec3 p_a, p_b;    // where the force acts on a and on b, in W
+  Vec3 turn_a, turn_b;  // rotation vectors from a to `axes` and on to b, in `axes`; of a member without its twist
   Vec3 way;             // without a member: from F to M, in `axes` [m]
-  Vec3 along_a;         // of a member: x of `axes` in those of a
   double length = 0;    // between the stations of a member [m]
 };
 
@@ -44,7 +43,7 @@ struct ElementForces {
 
 /// Of markers F on a and M on b. An element with one station or none deforms by the way from F to M in axes halfway
 /// between both, and by the rotation vector from F to M; a member by its chord: from its station on a to that on b, by
-/// what the chord lengthens and by the rotations of a and of b against it.
+/// what the chord lengthens, by the rotations of a and of b against it, and by what b is twisted about it against a.
 ElementGeometry measure_element(const Pose& X_WF, const Pose& X_WM, const Span&);
 
 /// The forces that do the work of the resultants on the rates of the deformations.

@@ -130,6 +130,42 @@ HWY_INLINE void turning(Num<D> s2, Num<D>& angle_over_sine, Num<D>& coefficient)
   coefficient = select(large, y, coefficient);
 }
 
+/// The least rotation from x of an end of a member to its chord, a quaternion with x = 0.
+template <class D>
+struct Swing {
+  Num<D> w, y, z;
+  Num<D> s2, over_sine, coefficient;  // turning() of its half
+
+  /// chord: along it, of length one, in the axes of the end.
+  HWY_INLINE void lay(const V3<D>& chord) {
+    const Num<D> half = num<D>(0.5), twice = maximum(chord.x + num<D>(1), num<D>(1e-30));
+    w = Num<D>{hn::Sqrt((half * twice).v)};
+    const Num<D> share = half / w;
+    y = num<D>(0) - share * chord.z, z = share * chord.y;
+    s2 = fma(y, y, z * z);
+    turning<D>(s2, over_sine, coefficient);
+  }
+  /// The end's axes laid along the chord.
+  HWY_INLINE Q4<D> apply(const Q4<D>& q) const {
+    return {fnma(q.z, z, fnma(q.y, y, q.w * w)), fnma(q.z, y, fma(q.y, z, q.x * w)), fnma(q.x, z, fma(q.y, w, q.w * y)),
+            fma(q.z, w, fma(q.x, y, q.w * z))};
+  }
+};
+
+/// Rotation of an end of a member in space against its chord, in the axes of the chord, and the tangent of its half.
+template <class D>
+struct Leaning {
+  Num<D> y, z, tangent_y, tangent_z;
+
+  /// cosine, sine: of the turn about the chord from the axes that the swing is seen in to those of the chord.
+  HWY_INLINE void set(const Swing<D>& swing, Num<D> cosine, Num<D> sine) {
+    const Num<D> about_y = fma(sine, swing.z, cosine * swing.y), about_z = fnma(sine, swing.y, cosine * swing.z);
+    const Num<D> per_w = num<D>(1) / swing.w;
+    y = swing.over_sine * about_y, z = swing.over_sine * about_z;
+    tangent_y = per_w * about_y, tangent_z = per_w * about_z;
+  }
+};
+
 /// Places of the bodies of one block of elements, side by side.
 template <class D>
 struct Poses {
@@ -260,12 +296,12 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
   constexpr bool is_member = Hinges == 2;
   const N x[2] = {constant(kStation), constant(kStation + 1)};
   N d[6];
-  V3<D> lever_a, lever_b, r;
-  M33<D> axes;     // F, of a member those of its chord
+  V3<D> lever_a, lever_b;
+  M33<D> axes;     // halfway between F and M, of a member between both laid along its chord
   N sine, cosine;  // of their turn in the plane
   N s2, over_sine, coefficient;
-  // without a member: the way from F to M, the vector of the quaternion of the turn, twice the inverse of the squared
-  // length of the sum of both quaternions, which lies halfway
+  // the way from F to M without a member; the vector of the quaternion of the turn, of a member its twist; twice the
+  // inverse of the squared length of the sum of both quaternions, which lies halfway
   V3<D> way, v;
   N excess, per_sum;
   const auto halve = [&](N w) TOPPLE_INLINED {
@@ -273,20 +309,17 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
     excess = excess_of<D>(s2);
     over_sine = num<D>(2) * fma(s2, excess, one);
   };
-  // a member: x of the stations on a and on b, the chord in the axes of a, the turn from there to the chord
-  N x_a, x_b, over_length, chord_x, chord_y, chord_z, swing_w, swing_y, swing_z, s2_a, over_sine_a, coefficient_a;
-  const auto measure_chord = [&](V3<D> chord) TOPPLE_INLINED {
+  // a member: x of the stations on a and on b, the turns from both ends to the chord
+  N x_a, x_b, over_length;
+  Swing<D> swing_a, swing_b;
+  const auto measure_chord = [&](const V3<D>& chord) TOPPLE_INLINED {
     x_a = minimum(x[0], x[1]), x_b = maximum(x[0], x[1]);
     // an empty lane has none
     over_length = one / N{hn::Sqrt(maximum(dot(chord, chord), num<D>(1e-60)).v)};
-    chord_x = over_length * chord.x, chord_y = over_length * chord.y, chord_z = over_length * chord.z;
-    const N twice = maximum(chord_x + one, num<D>(1e-30)), w = N{hn::Sqrt((half * twice).v)};
-    const N share = half / w;
-    swing_w = w, swing_y = zero - share * chord_z, swing_z = share * chord_y;
-    s2_a = fma(swing_y, swing_y, swing_z * swing_z);
-    turning<D>(s2_a, over_sine_a, coefficient_a);
     d[0] = fms(over_length, dot(chord, chord), x_b - x_a);
+    return V3<D>{over_length * chord.x, over_length * chord.y, over_length * chord.z};
   };
+  Leaning<D> to_chord, from_b;  // of a member in space: of its chord against a, and against b
   if constexpr (is_plane) {
     const PlanarMarker<D> at_a(A, constant, kMarkerA), at_b(B, constant, kMarkerB);
     PlanarTurn<D> turned = at_a.turn;
@@ -298,8 +331,8 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
     const auto along_of = [&]() TOPPLE_INLINED { return fms(cosine, along_x, sine * along_z); };
     sine = turned.sine(), cosine = turned.cosine();
     if constexpr (is_member) {
-      measure_chord({along_of(), zero, across_of()});
-      turned = turned.then({swing_w, swing_y});
+      swing_a.lay(measure_chord({along_of(), zero, across_of()}));
+      turned = turned.then({swing_a.w, swing_a.y});
     }
     const PlanarTurn<D> apart_by = turned.back().then(at_b.turn);
     v.y = {hn::CopySign(apart_by.y.v, hn::Xor(apart_by.y.v, apart_by.w.v))};
@@ -318,7 +351,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
     if constexpr (is_member) sine = turned.sine(), cosine = turned.cosine();
     N moved = across_of(), rotation = over_sine * v.y;
     if constexpr (is_member) {
-      const N turn_a = over_sine_a * swing_y;
+      const N turn_a = swing_a.over_sine * swing_a.y;
       moved = fma(x_a, turn_a, x_b * rotation);
       rotation = turn_a + rotation;
     } else {
@@ -329,41 +362,48 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
   } else {
     lever_a = turn(A.q, constant3(kMarkerA));
     lever_b = turn(B.q, constant3(kMarkerB));
-    Q4<D> qF = A.q * constant4(kMarkerA + 3);
-    const Q4<D> qM = B.q * constant4(kMarkerB + 3);
+    Q4<D> qF = A.q * constant4(kMarkerA + 3), qM = B.q * constant4(kMarkerB + 3);
     const V3<D> apart = B.p - A.p, between = (apart - lever_a) + lever_b;
+    const auto back = [&](const Q4<D>& q) TOPPLE_INLINED { return Q4<D>{q.w, zero - q.x, zero - q.y, zero - q.z}; };
     if constexpr (is_member) {
-      measure_chord(turn(Q4<D>{qF.w, zero - qF.x, zero - qF.y, zero - qF.z}, between));
-      qF = qF * Q4<D>{swing_w, zero, swing_y, swing_z};
+      const V3<D> chord = measure_chord(between);
+      swing_a.lay(turn(back(qF), chord)), swing_b.lay(turn(back(qM), chord));
+      qF = swing_a.apply(qF), qM = swing_b.apply(qM);
     }
-    const Q4<D> q = conj_times(qF, qM);
-    v = {{hn::CopySign(q.x.v, hn::Xor(q.x.v, q.w.v))},
-         {hn::CopySign(q.y.v, hn::Xor(q.y.v, q.w.v))},
-         {hn::CopySign(q.z.v, hn::Xor(q.z.v, q.w.v))}};
-    s2 = dot(v, v);
+    Q4<D> q;
     if constexpr (is_member) {
-      turning<D>(s2, over_sine, coefficient);
+      q.w = fma(qF.z, qM.z, fma(qF.y, qM.y, fma(qF.x, qM.x, qF.w * qM.w)));
+      q.x = fma(qF.z, qM.y, fnma(qF.y, qM.z, fms(qF.w, qM.x, qF.x * qM.w)));
     } else {
-      halve(q.w);
-      const auto sign = hn::CopySign(zero.v, q.w.v);
-      const auto add = [&](N a, N b) TOPPLE_INLINED { return a + N{hn::Xor(b.v, sign)}; };
-      axes = to_matrix({add(qF.w, qM.w), add(qF.x, qM.x), add(qF.y, qM.y), add(qF.z, qM.z)}, per_sum);
+      q = conj_times(qF, qM);
+    }
+    v.x = {hn::CopySign(q.x.v, hn::Xor(q.x.v, q.w.v))};
+    if constexpr (is_member) {
+      s2 = v.x * v.x;
+    } else {
+      v.y = {hn::CopySign(q.y.v, hn::Xor(q.y.v, q.w.v))};
+      v.z = {hn::CopySign(q.z.v, hn::Xor(q.z.v, q.w.v))};
+      s2 = dot(v, v);
+    }
+    halve(q.w);
+    const auto sign = hn::CopySign(zero.v, q.w.v);
+    const auto add = [&](N a, N b) TOPPLE_INLINED { return a + N{hn::Xor(b.v, sign)}; };
+    axes = to_matrix({add(qF.w, qM.w), add(qF.x, qM.x), add(qF.y, qM.y), add(qF.z, qM.z)}, per_sum);
+    if constexpr (is_member) {
+      to_chord.set(swing_a, abs(q.w), v.x), from_b.set(swing_b, abs(q.w), zero - v.x);
+      d[1] = fms(x_b, from_b.z, x_a * to_chord.z), d[2] = fms(x_a, to_chord.y, x_b * from_b.y);
+      d[3] = over_sine * v.x, d[4] = to_chord.y - from_b.y, d[5] = to_chord.z - from_b.z;
+    } else {
       const V3<D> to_middle = half * between;
       lever_a = lever_a + to_middle, lever_b = lever_b - to_middle;
-    }
-    if constexpr (is_member) axes = to_matrix(qF);
-    r = over_sine * v;
-    if constexpr (is_member) {
-      const N turn_y = over_sine_a * swing_y, turn_z = over_sine_a * swing_z;
-      d[1] = zero - fma(x_a, turn_z, x_b * r.z), d[2] = fma(x_a, turn_y, x_b * r.y);
-      d[3] = r.x, d[4] = turn_y + r.y, d[5] = turn_z + r.z;
-    } else {
+      const V3<D> r = over_sine * v;
       way = transpose_times(axes, between);
       d[0] = way.x, d[1] = way.y, d[2] = way.z, d[3] = r.x, d[4] = r.y, d[5] = r.z;
     }
   }
   auto too_far = hn::Gt(s2.v, constant(kMostTurn).v);
-  if constexpr (is_member) too_far = hn::Or(too_far, hn::Gt(s2_a.v, constant(kMostTurn).v));
+  if constexpr (is_member) too_far = hn::Or(too_far, hn::Gt(swing_a.s2.v, constant(kMostTurn).v));
+  if constexpr (is_member && !is_plane) too_far = hn::Or(too_far, hn::Gt(swing_b.s2.v, constant(kMostTurn).v));
   auto outside = too_far;
 
   N u[6], e[6], f[6], k[6], was[6], before[6];
@@ -489,21 +529,22 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
     store<D>(fms(lever_b.z, fx, lever_b.x * fz) + torque_b, out, 7);
   } else {
     // torques conjugate to the rates of the rotation vectors
-    V3<D> m{g[3], g[4], g[5]}, shear{g[0], g[1], g[2]}, torque_a, torque_b;
+    V3<D> shear{g[0], g[1], g[2]}, torque_a, torque_b;
     if constexpr (is_member) {
-      m.y = fma(x_b, g[2], m.y), m.z = fnma(x_b, g[1], m.z);
-      const V3<D> rm = cross(r, m);
-      torque_b = fma(coefficient, cross(r, rm), fma(half, rm, m));
-      const N turn_y = over_sine_a * swing_y, turn_z = over_sine_a * swing_z;
-      const N m_y = fma(x_a, g[2], g[4]), m_z = fnma(x_a, g[1], g[5]);
-      const N twist = fms(turn_y, m_z, turn_z * m_y), bent = coefficient_a * twist;
-      const V3<D> seen{zero - half * twist, fma(bent, turn_z, m_y), fnma(bent, turn_y, m_z)};
-      const N handed = (seen.x - torque_b.x) / maximum(one + chord_x, num<D>(1e-30));
-      torque_a = {torque_b.x, fma(handed, chord_y, seen.y), fma(handed, chord_z, seen.z)};
+      const N a_y = fma(x_a, g[2], g[4]), a_z = fnma(x_a, g[1], g[5]);
+      const N b_y = fma(x_b, g[2], g[4]), b_z = fnma(x_b, g[1], g[5]);
+      const N twist_a = fms(to_chord.y, a_z, to_chord.z * a_y), twist_b = fms(from_b.y, b_z, from_b.z * b_y);
+      const N bent_a = swing_a.coefficient * twist_a, bent_b = swing_b.coefficient * twist_b;
+      const N given_a = fnma(half, twist_b, g[3]), given_b = fnma(half, twist_a, g[3]);
+      const N torsion = fnma(half, twist_a, given_a);
+      torque_a = {torsion, fnma(given_a, to_chord.tangent_z, fma(bent_a, to_chord.z, a_y)),
+                  fma(given_a, to_chord.tangent_y, fnma(bent_a, to_chord.y, a_z))};
+      torque_b = {torsion, fnma(given_b, from_b.tangent_z, fma(bent_b, from_b.z, b_y)),
+                  fma(given_b, from_b.tangent_y, fnma(bent_b, from_b.y, b_z))};
       shear.y = over_length * (torque_a.z - torque_b.z), shear.z = over_length * (torque_b.y - torque_a.y);
       torque_a = axes * torque_a, torque_b = axes * torque_b;
     } else {
-      const V3<D> conjugate = m - excess * cross(v, cross(v, m));
+      const V3<D> m{g[3], g[4], g[5]}, conjugate = m - excess * cross(v, cross(v, m));
       torque_a = torque_b = axes * (conjugate + cross(cross(way, shear), (half * per_sum) * v));
     }
     const V3<D> force = axes * shear;

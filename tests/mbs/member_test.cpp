@@ -169,28 +169,32 @@ TEST(Zone, ForcesDoTheWorkOfTheResultants) { check_work({}, {1e-3, 0.3, 0.8, 1.7
 /// The same in a mirror, of a vector and of a rotation; x, y and z of a marker there are again right-handed.
 Pose mirror(const Pose& X) { return {{X.p.x, -X.p.y, X.p.z}, {X.q.w, -X.q.x, X.q.y, -X.q.z}}; }
 
-TEST(Zone, IsTheSameInAMirrorAndFromItsOtherEnd) {
+void check_mirror(const Span& span) {
   std::mt19937 random(5);
   const Six f{{3, -5, 7, 2, -1, 4}};
   const Quat back{0, 0, 0, 1};  // x the other way
   for (const double turn : {1e-3, 0.3, 1.2}) {
     for (int i = 0; i < 20; ++i) {
       const Poses p = make_poses(random, turn);
-      const ElementForces on = calc_element_forces(measure_element(p.F, p.M, {}), f);
+      const ElementForces on = calc_element_forces(measure_element(p.F, p.M, span), f);
       // shear along y, torsion and the moment about z change their sign in the mirror
-      const ElementGeometry seen = measure_element(mirror(p.F), mirror(p.M), {});
+      const ElementGeometry seen = measure_element(mirror(p.F), mirror(p.M), span);
       const ElementForces there = calc_element_forces(seen, {{3, 5, 7, -2, -1, -4}});
       EXPECT_LT(norm(there.force - Vec3{on.force.x, -on.force.y, on.force.z}), 1e-12) << i;
       EXPECT_LT(norm(there.torque_a - Vec3{-on.torque_a.x, on.torque_a.y, -on.torque_a.z}), 1e-12) << i;
       // from b to a with x turned about: what is pulled stays pulled
-      const ElementGeometry g = measure_element({p.M.p, p.M.q * back}, {p.F.p, p.F.q * back}, {});
+      const ElementGeometry g = measure_element({p.M.p, p.M.q * back}, {p.F.p, p.F.q * back}, {-span.b, -span.a});
       const ElementForces other = calc_element_forces(g, {{3, -5, -7, 2, -1, -4}});
       EXPECT_LT(norm(other.force + on.force), 1e-12) << i;
       EXPECT_LT(norm(other.torque_b + on.torque_a), 1e-12) << i;
-      EXPECT_LT(norm(g.p_a - measure_element(p.F, p.M, {}).p_a), 1e-12) << i;
+      EXPECT_LT(norm(g.p_a - measure_element(p.F, p.M, span).p_b), 1e-12) << i;
     }
   }
 }
+
+TEST(Zone, IsTheSameInAMirrorAndFromItsOtherEnd) { check_mirror({}); }
+
+TEST(Member, IsTheSameInAMirrorAndFromItsOtherEnd) { check_mirror({-1.4, 1.7}); }
 
 TEST(Member, SmallDeformationsAreThoseOfTheMarkers) {
   std::mt19937 random(3);
