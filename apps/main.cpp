@@ -76,6 +76,8 @@ int dispatch(const topple::apps::Arguments& a) {
   if (!heeds_cancel(a)) {
     set_endings(on_interrupt_of_short);
     if (cancel) on_interrupt_of_short(SIGINT);
+  } else {
+    std::signal(SIGPIPE, SIG_IGN);  // what reads the words may end first: files are written all the same
   }
   using topple::apps::Arguments;
   switch (a.verb) {

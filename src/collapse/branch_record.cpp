@@ -22,7 +22,9 @@ BranchRecord::BranchRecord(const Branch& b, const Knowledge& k, const RunOptions
   for (const Piece& p : b.pieces)
     if (&p != &b.pieces.back()) summary_.wall_time += p.seconds;
   fill_provenance(options, "native", record_);
-  fill_from_plan(live_->plan(), live_->model(), live_->map(), record_);
+  fill_from_plan(live_->given_plan(), live_->model(), live_->map(), record_);
+  for (const LiveModel::Applied& a : live_->applied())
+    record_.plan_values.push_back({"Edits", fmt::format("Edit at {:.6g} s", a.time), a.text + "."});
   recorder_.emplace(live_->model(), live_->map(), k_, record_, nobody_);
   if (has_screening(live_->plan())) recorder_->keep_speeds();
   for (const Piece& p : b.pieces) {

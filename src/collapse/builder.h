@@ -140,6 +140,7 @@ struct Builder : BuilderState {
   double volume_of(const Assembly&) const;
   Vec3 half_of_node(const GridPoint&) const;
   int node_at(const GridPoint&) const;
+  void complain_of_joint(const Assembly&);
   int find_at(const std::map<GridPoint, int>&, const GridPoint&) const;
   int add_assembly(Assembly);
   void put_on_nodes(const std::vector<Part>& parts, int axis, double middle, int node_a, int node_b);

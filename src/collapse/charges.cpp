@@ -110,10 +110,16 @@ std::string tell_pieces_between_gaps(const product::Plan& plan) {
       columns.size(), columns.front(), columns.front(), falls, gaps_alone);
 }
 
-/// "stage 1 "Rear": 5 charges, 1 fails".
-std::string tell_stage(const product::Stage& stage, size_t number) {
-  const size_t charges = stage.charges.size();
-  const auto failing = std::count_if(stage.charges.begin(), stage.charges.end(), [](const auto& c) { return c.fails; });
+/// "stage 1 "Rear": 5 charges, 1 fails", without those that were taken out of the plan.
+std::string tell_stage(const product::Stage& stage, size_t number, const std::vector<Firing>& schedule) {
+  size_t charges = 0, failing = 0;
+  for (const Firing& f : schedule) {
+    if (static_cast<size_t>(f.stage) + 1 != number) continue;
+    const bool is_planned_to_fail = stage.charges[static_cast<size_t>(f.charge)].fails;
+    if (f.fails && !is_planned_to_fail) continue;
+    ++charges;
+    failing += f.fails;
+  }
   std::string text =
       fmt::format("stage {} \"{}\": {}", number, stage.name, count_words(static_cast<long long>(charges), "charge"));
   if (failing > 0) text += fmt::format(", {} {}", failing, failing == 1 ? "fails" : "fail");
@@ -131,7 +137,7 @@ void Builder::add_events(std::vector<Firing> schedule) {
   std::erase_if(map.notes,
                 [](const ModelNote& note) { return note.title == between_gaps || note.title == without_hold; });
   if (const std::string text = tell_pieces_between_gaps(plan); !text.empty()) map.notes.push_back({between_gaps, text});
-  for (size_t s = 0; s < plan.stages.size(); ++s) map.stages.push_back(tell_stage(plan.stages[s], s + 1));
+  for (size_t s = 0; s < plan.stages.size(); ++s) map.stages.push_back(tell_stage(plan.stages[s], s + 1, map.schedule));
   std::vector<Assembly> current = assemblies;  // as they are after the events so far
   std::vector<Vec3> centre;                    // their centres of mass at the start, in W
   for (const mbs::Body& b : model.bodies) centre.push_back(b.X_WB.p);

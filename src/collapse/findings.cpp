@@ -591,9 +591,11 @@ void add_vibration(const Context& c, const Mechanism& m) {
     if (n.vibration_limit > 0)
       text += fmt::format(". Limit of the plan: {:g} mm/s", least / unit::mm);
     else if (least > 0)
-      text += fmt::format(". Limit at the foundation between {:g} Hz and {:g} Hz: {:.3g} to {:.3g} mm/s ({}, {})",
-                          law.low_frequency, law.high_frequency, least / unit::mm, most / unit::mm, kVibrationSource,
-                          describe_vibration_limit(n.building_class));
+      text += fmt::format(
+          ". Limit at the foundation between {:g} Hz and {:g} Hz: {:.3g} to {:.3g} mm/s (DIN 4150-3:1999-02, Table 1, "
+          "{})",
+          law.low_frequency, law.high_frequency, least / unit::mm, most / unit::mm,
+          describe_vibration_limit(n.building_class));
     Status status = Status::Info;
     if (least > 0) {
       status = high < least ? Status::Good : low > most ? Status::Bad : Status::Warning;
@@ -805,26 +807,36 @@ void add_rigid_block(const Context& c) {
   c.r.series.insert(c.r.series.begin() + 1, std::move(series));
 }
 
+const product::Charge& charge_of(const Context& c, const Firing& f) {
+  return c.plan.stages[static_cast<size_t>(f.stage)].charges[static_cast<size_t>(f.charge)];
+}
 const std::string& member_of(const Context& c, const Firing& f) {
-  const product::Charge& charge = c.plan.stages[static_cast<size_t>(f.stage)].charges[static_cast<size_t>(f.charge)];
-  return c.plan.members[static_cast<size_t>(charge.member)].name;
+  return c.plan.members[static_cast<size_t>(charge_of(c, f).member)].name;
 }
 
 void add_events(const Context& c) {
   std::map<std::string, long> n;
-  // events of charges that fail say so
-  long failed = 0;
+  // events of charges that fail say so; those that were taken out of the plan fail without its word
+  long failed = 0, taken_out = 0;
   for (const record::Event& e : c.r.events) {
-    const bool fails = std::any_of(c.map.schedule.begin(), c.map.schedule.end(), [&](const Firing& f) {
+    const auto failing = std::find_if(c.map.schedule.begin(), c.map.schedule.end(), [&](const Firing& f) {
       return f.fails && f.time == e.time && e.kind == "charge" && member_of(c, f) == e.subject;
     });
-    ++(fails ? failed : n[e.kind]);
+    if (failing == c.map.schedule.end())
+      ++n[e.kind];
+    else
+      ++(charge_of(c, *failing).fails ? failed : taken_out);
   }
+  // bars that a charge left and that are crushed later are no zone that broke
+  const auto zones = c.r.zone_state.end() - static_cast<std::ptrdiff_t>(c.r.zones.size());
+  const auto joints = zones + static_cast<std::ptrdiff_t>(c.model.elements.size() + c.model.rotational_elements.size());
+  const auto broken = std::count(zones, joints, static_cast<std::uint8_t>(record::ZoneState::Broken));
   std::string text = fmt::format("Charges: {}; zones yielded: {}, broken: {}; joints off: {}; parts on the ground: {}.",
-                                 n["charge"], n["yield"], n["rupture"], n["release"], n["touchdown"]);
+                                 n["charge"], n["yield"], broken, n["release"], n["touchdown"]);
   if (c.charges_left > 0) text += " " + tell_charges_left(c);
   if (failed > 0)
     text += " " + count_words(failed, "", "charge fails, as the plan says", "charges fail, as the plan says") + ".";
+  if (taken_out > 0) text += " " + count_words(taken_out, "", "charge was taken out", "charges were taken out") + ".";
   c.add("events", "Events", "Events", text, static_cast<double>(c.r.events.size()), "1",
         c.charges_left > 0 ? Status::Warning : Status::Info);
   size_t i = 0;
@@ -1106,7 +1118,8 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
     add_verification(c);
     return true;
   }
-  const std::vector<Mechanism> verdicts = judge_structures(plan, model, map, k, recorder, summary, is_under_way);
+  const std::vector<Mechanism> verdicts =
+      judge_structures(plan, model, map, k, recorder, summary, is_under_way, r.ending == "cancelled");
   const Mechanism m = judge_run(verdicts, map, k, recorder);
   if (r.ending == "time_limit") c.open = find_open_parts(r, map, verdicts, norm(model.gravity), plan.ground.friction);
   add_mechanism(c, m);

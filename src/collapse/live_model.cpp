@@ -61,7 +61,8 @@ std::string words_of_time(double t) { return fmt::format("{:.6g} s", t); }
 
 }  // namespace
 
-LiveModel::LiveModel(product::Plan plan, const Knowledge& k, int threads) : plan_(std::move(plan)), k_(&k) {
+LiveModel::LiveModel(product::Plan plan, const Knowledge& k, int threads)
+    : given_(std::make_shared<const product::Plan>(plan)), plan_(std::move(plan)), k_(&k) {
   Builder builder(plan_, k, map_, threads);
   builder.build();
   limit_frequency(builder.model, k.body_highest_frequency);
@@ -374,7 +375,10 @@ std::string LiveModel::add_cable(const Edit& e) {
   demand(norm(m.start + (length > 0 ? e.position / length : 0) * (m.end - m.start) - e.anchor) >= 1e-3,
          "anchor is where the cable is tied to " + m.name, "a cable without length pulls in no direction");
   product::Cable c;
-  c.name = fmt::format("added {}", plan_.cables.size() + 1);
+  size_t number = plan_.cables.size();
+  do c.name = fmt::format("added {}", ++number);
+  while (
+      std::any_of(plan_.cables.begin(), plan_.cables.end(), [&c](const auto& other) { return other.name == c.name; }));
   c.member = index;
   c.position = e.position;
   c.anchor = e.anchor;

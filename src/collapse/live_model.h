@@ -27,6 +27,7 @@ class LiveModel {
   LiveModel& operator=(const LiveModel&) = delete;
 
   const product::Plan& plan() const { return plan_; }
+  const product::Plan& given_plan() const { return *given_; }  // before the edits
   const mbs::Model& model() const { return built_.model; }
   const ModelMap& map() const { return map_; }
   const Knowledge& knowledge() const { return *k_; }
@@ -77,6 +78,7 @@ class LiveModel {
   /// Events of charges and edits as they are now; what has fired comes out the same.
   void lay_out_events();
 
+  std::shared_ptr<const product::Plan> given_;
   product::Plan plan_;
   const Knowledge* k_;
   ModelMap map_;

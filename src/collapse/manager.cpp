@@ -508,6 +508,19 @@ double Builder::volume_of(const Assembly& a) const {
   return volume;
 }
 
+/// Of a joint without mass, at a beam that ends in it: what lies in the slab is the slab's.
+void Builder::complain_of_joint(const Assembly& a) {
+  int beam = -1;
+  for (const auto& [at, body] : node_body)
+    if (&assemblies[static_cast<size_t>(body)] == &a)
+      for (const int index : {find_at(x_beams, at), find_at(x_beams, {at.row - 1, at.frame, at.storey}),
+                              find_at(y_beams, at), find_at(y_beams, {at.row, at.frame - 1, at.storey})})
+        if (beam < 0) beam = index;
+  complaints.push_back({Severity::Error, "E622", beam < 0 ? SourcePosition{} : member(beam).where, 1,
+                        a.name + ": a joint without mass: beams no deeper than their slab end there, and no column",
+                        "give the beams more depth than the slab has, or put a column there"});
+}
+
 void Builder::finish_bodies() {
   // boxes overlap, of a ring's pieces and of slabs with the beams under them: volumes are those of members' masses
   for (const Assembly& a : assemblies)
@@ -516,7 +529,7 @@ void Builder::finish_bodies() {
   for (auto& [index, mass] : volume_per_mass) mass = calc_volume(plan, member(index)) / mass;
   for (const Assembly& a : assemblies) {
     if (!(a.mass() > 0)) {
-      complaints.push_back({Severity::Error, "E622", {}, 1, a.name + ": a joint without mass", ""});
+      complain_of_joint(a);
       continue;
     }
     mbs::Body body = make_body(a, k);

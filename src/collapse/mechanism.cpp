@@ -244,7 +244,9 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   const Vec3& way = out.is_azimuth_of_lean ? direction : out.run;
   const bool has_way = out.is_azimuth_of_lean || norm(out.run) >= kLeastRun;
   out.azimuth = has_way ? std::atan2(way.y, way.x) : std::numeric_limits<double>::quiet_NaN();
-  if (in.is_under_way)
+  if (in.is_cancelled)
+    out.text += fmt::format(" The run was cancelled: this is how it stood at {:.2f} s.", last.time);
+  else if (in.is_under_way)
     out.text += fmt::format(" The run is under way: this is how it stands at {:.2f} s.", last.time);
   else if (out.name != "stands" && !in.came_to_rest)
     out.text += " Parts were still moving when the run ended.";

@@ -50,7 +50,8 @@ struct MechanismInput {
   double foot = 0;                            // height of the upper block's underside at the start [m]
   double storey_height = 0;                   // of the ground storey [m]
   bool came_to_rest = false;
-  bool is_under_way = false;  // the run goes on; for the words
+  bool is_under_way = false;  // the run goes on, or was cancelled; for the words
+  bool is_cancelled = false;
 };
 
 /// Where one of several structures fell.

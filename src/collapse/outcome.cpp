@@ -31,7 +31,7 @@ namespace {
 /// Of each structure.
 std::vector<MechanismInput> make_mechanism_inputs(const product::Plan& plan, const mbs::Model& model,
                                                   const ModelMap& map, const Recorder& recorder,
-                                                  const mbs::Summary& summary, bool is_under_way) {
+                                                  const mbs::Summary& summary, bool is_under_way, bool is_cancelled) {
   MechanismInput in;
   in.fall_direction = map.fall_direction;
   in.is_direction_planned = map.is_direction_planned;
@@ -39,6 +39,7 @@ std::vector<MechanismInput> make_mechanism_inputs(const product::Plan& plan, con
   in.storey_height = map.ground_storey_height;
   in.came_to_rest = summary.ending == mbs::Summary::Ending::AtRest;
   in.is_under_way = is_under_way;
+  in.is_cancelled = is_cancelled;
   for (const StageTimes& t : find_stage_times(map)) in.last_charge = std::max(in.last_charge, t.last);
   const size_t S = map.structures.size();
   std::vector<double> mass(S, 0);
@@ -76,9 +77,10 @@ std::vector<MechanismInput> make_mechanism_inputs(const product::Plan& plan, con
 
 std::vector<Mechanism> judge_structures(const product::Plan& plan, const mbs::Model& model, const ModelMap& map,
                                         const Knowledge& k, const Recorder& recorder, const mbs::Summary& summary,
-                                        bool is_under_way) {
+                                        bool is_under_way, bool is_cancelled) {
   std::vector<Mechanism> verdicts;
-  for (const MechanismInput& in : make_mechanism_inputs(plan, model, map, recorder, summary, is_under_way))
+  for (const MechanismInput& in :
+       make_mechanism_inputs(plan, model, map, recorder, summary, is_under_way, is_cancelled))
     verdicts.push_back(judge_mechanism(in, k));
   return verdicts;
 }
@@ -99,7 +101,7 @@ Mechanism judge_run(const std::vector<Mechanism>& verdicts, const ModelMap& map,
 
 std::vector<NearVerdict> find_near_verdicts(const product::Plan& plan, const mbs::Model& model, const ModelMap& map,
                                             const Knowledge& k, const Recorder& recorder, const mbs::Summary& summary) {
-  const std::vector<MechanismInput> inputs = make_mechanism_inputs(plan, model, map, recorder, summary, false);
+  const std::vector<MechanismInput> inputs = make_mechanism_inputs(plan, model, map, recorder, summary, false, false);
   return inputs.size() == 1 ? find_near_verdicts(inputs.front(), k) : std::vector<NearVerdict>{};
 }
 

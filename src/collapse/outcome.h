@@ -21,7 +21,8 @@ std::vector<StageTimes> find_stage_times(const ModelMap&, bool all = false);
 
 /// How each structure of the map came down, or how things stand in a run that goes on. There is at least one frame.
 std::vector<Mechanism> judge_structures(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&,
-                                        const Recorder&, const mbs::Summary&, bool is_under_way = false);
+                                        const Recorder&, const mbs::Summary&, bool is_under_way = false,
+                                        bool is_cancelled = false);
 /// One verdict on all of them.
 Mechanism judge_run(const std::vector<Mechanism>& verdicts, const ModelMap&, const Knowledge&, const Recorder&);
 

@@ -178,15 +178,15 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
   if (want.mechanism) add("Limits", "Mechanism", *want.mechanism);
   if (want.azimuth)
     add("Limits", "Direction of fall",
-        fmt::format("{:.4g} deg +- {:.4g} deg", *want.azimuth / unit::deg,
+        fmt::format("{} +- {:g} deg", record::tell_azimuth(*want.azimuth, record::count_digits_of_angle(*want.azimuth)),
                     want.azimuth_tolerance.value_or(0) / unit::deg));
-  if (want.debris_reach) add("Limits", "Reach of the debris", fmt::format("at most {:.4g} m", *want.debris_reach));
+  if (want.debris_reach) add("Limits", "Reach of the debris", fmt::format("at most {:.7g} m", *want.debris_reach));
   if (want.stands_between_stages)
     add("Limits", "Between the stages", *want.stands_between_stages ? "it stands" : "it falls");
   for (const product::Neighbour& n : plan.neighbours) {
-    if (n.clearance) add("Limits", "Clearance of " + n.name, fmt::format("{:.4g} m", *n.clearance));
+    if (n.clearance) add("Limits", "Clearance of " + n.name, fmt::format("{:.7g} m", *n.clearance));
     if (n.vibration_limit > 0)
-      add("Limits", "Vibration of " + n.name, fmt::format("{:.4g} mm/s", n.vibration_limit / unit::mm));
+      add("Limits", "Vibration of " + n.name, fmt::format("{:.7g} mm/s", n.vibration_limit / unit::mm));
     if (n.building_class != product::BuildingClass::Unknown)
       add("Limits", "Class of " + n.name, describe_vibration_limit(n.building_class));
   }

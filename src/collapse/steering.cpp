@@ -23,7 +23,8 @@ void tell_edit(const Edit& e, const std::string& text, double time, LiveRun& run
 bool changes_start(const Edit& e, const mbs::Moment& moment, const LiveModel& live) {
   if (moment.steps > 0) return false;
   using Kind = Edit::Kind;
-  if (e.kind == Kind::AddCable) return true;  // it pulls in the equilibrium
+  // it pulls in the equilibrium, or weakens what stands in it
+  if (e.kind == Kind::AddCable || e.kind == Kind::AddPreCut) return true;
   // one that has never pulled is taken out of it
   if (e.kind == Kind::RemoveCable) return live.has_added_cable(e.cable);
   if (e.kind == Kind::SetFriction) return false;
@@ -42,13 +43,16 @@ bool changes_nothing(const Edit& e, const LiveModel& before, const LiveModel& af
                     [](const LiveCharge& a, const LiveCharge& b) { return a.time == b.time; });
 }
 
+/// Frames of a branch that goes on from others.
+size_t count_shared(const Branch& b) {
+  size_t n = 0;
+  for (size_t i = 0; i + 1 < b.pieces.size(); ++i) n += b.pieces[i].frames;
+  return n;
+}
+
 }  // namespace
 
-size_t Branch::frames() const {
-  size_t n = 0;
-  for (size_t i = 0; i + 1 < pieces.size(); ++i) n += pieces[i].frames;
-  return n + run().record().time.size();
-}
+size_t Branch::frames() const { return count_shared(*this) + run().record().time.size(); }
 
 std::pair<const Piece*, size_t> Branch::find_frame(size_t frame) const {
   for (const Piece& p : pieces) {
@@ -286,7 +290,7 @@ Steering::Made Steering::edit(const Edit& e, const std::string& name, bool in_pl
     run = std::make_shared<LiveRun>(std::move(model), options_.run, options_.moment_interval, moment, is_successor,
                                     last.run->recorder());
   }
-  const EditEntry entry{e, made.text, made.time, !stays, from.id, base};
+  const EditEntry entry{e, made.text, made.time, !stays, from.id, base, from.first_frame};
   std::vector<Piece> pieces;
   if (!is_anew) pieces = base;
   pieces.push_back({run, 0, 0, 0});
@@ -294,6 +298,7 @@ Steering::Made Steering::edit(const Edit& e, const std::string& name, bool in_pl
     from.run().rest();
     from.pieces = std::move(pieces);
     from.edits.push_back(entry);
+    if (is_anew) start_anew(from, 0);
     watch(from);
     go_live();
     made.branch = &from;
@@ -303,7 +308,7 @@ Steering::Made Steering::edit(const Edit& e, const std::string& name, bool in_pl
     b.parent = from.id;
     b.time = made.time;
     b.pieces = std::move(pieces);
-    for (size_t i = 0; i + 1 < b.pieces.size(); ++i) b.first_frame += b.pieces[i].frames;
+    b.first_frame = count_shared(b);
     b.edits.push_back(entry);
     b.sample = from.sample;
     made.branch = &add_branch(std::move(b));
@@ -311,6 +316,18 @@ Steering::Made Steering::edit(const Edit& e, const std::string& name, bool in_pl
   tell_edit(e, made.text, made.time, *run);
   if (stays && callbacks_.on_branch) callbacks_.on_branch(from);
   return made;
+}
+
+void Steering::start_anew(Branch& b, size_t first_frame) {
+  b.first_frame = first_frame;
+  ++b.starts;
+  // what parts from it keeps the frames that it had
+  for (const auto& other : branches_) {
+    if (other->parent != b.id || other->first_frame == 0) continue;
+    other->first_frame = 0;
+    ++other->starts;
+    if (callbacks_.on_branch) callbacks_.on_branch(*other);
+  }
 }
 
 Steering::Made Steering::fork(const std::string& name) {
@@ -322,12 +339,12 @@ Steering::Made Steering::fork(const std::string& name) {
   b.parent = from.id;
   b.pieces = cut(from, cursor_);
   b.time = b.pieces.back().time;
-  for (const Piece& p : b.pieces) b.first_frame += p.frames;
   b.sample = from.sample;
   Made made;
   made.time = b.time;
   made.step = b.pieces.back().step;
   b.pieces.push_back({go_on(b.pieces, b.pieces.back().run->model_pointer(), false), 0, 0, 0});
+  b.first_frame = count_shared(b);
   made.branch = &add_branch(std::move(b));
   made.text = fmt::format("branch \"{}\"", made.branch->name);
   return made;
@@ -348,8 +365,10 @@ Steering::Made Steering::undo() {
     return made;
   }
   if (is_fresh && entry.before.back().run->steps() == entry.before.back().step) {
+    const bool is_anew = from.pieces.front().run != entry.before.front().run;
     from.pieces = entry.before;
     from.edits.pop_back();
+    if (is_anew) start_anew(from, entry.first_frame);
     go_live();
     watch(from);
     made.branch = &from;
@@ -361,10 +380,10 @@ Steering::Made Steering::undo() {
   b.parent = from.id;
   b.time = entry.time;
   b.pieces = entry.before;
-  for (const Piece& p : b.pieces) b.first_frame += p.frames;
   b.edits.assign(from.edits.begin(), from.edits.end() - 1);
   b.sample = from.sample;
   b.pieces.push_back({go_on(b.pieces, b.pieces.back().run->model_pointer(), false), 0, 0, 0});
+  b.first_frame = count_shared(b);
   made.branch = &add_branch(std::move(b));
   return made;
 }

@@ -30,6 +30,7 @@ struct EditEntry {
   bool made_branch = false;   // by itself
   int from = 0;               // branch on which it was made
   std::vector<Piece> before;  // the branch's pieces without it
+  size_t first_frame = 0;     // and its first frame
 };
 
 struct Branch {
@@ -38,6 +39,7 @@ struct Branch {
   int parent = 0;                // 0: a plan's start
   double time = 0;               // where it began [s]
   size_t first_frame = 0;        // of its own
+  int starts = 0;                // how often its frames began anew since it was made
   std::vector<Piece> pieces;     // the last one goes on
   std::vector<EditEntry> edits;  // its own
   std::string sample;            // of a study, in words; empty: none
@@ -125,6 +127,8 @@ class Steering {
  private:
   Branch& add_branch(Branch);
   void thin_out();
+  /// Of a branch whose frames began anew.
+  void start_anew(Branch&, size_t first_frame);
   /// A name that no branch has: the wanted one, or "what-if N". Throws InputError E912.
   std::string free_name(const std::string& wanted) const;
   /// The same for one more branch. Throws InputError E905 where there are too many.

@@ -124,6 +124,7 @@ Json describe_branch(const collapse::Steering& s, const Branch& b, const std::st
   j["frontier"] = run.time();
   j["frames"] = b.frames();
   j["first_frame"] = b.first_frame;
+  j["starts"] = b.starts;
   j["duration"] = plan.analysis.duration;
   j["ending"] = nullptr;
   if (run.has_ended()) {

@@ -276,11 +276,12 @@ void Session::publish_frame(bool is_due) {
   if (!steering_) return;
   const Branch& b = steering_->steering().active();
   const std::size_t n = b.frames();
-  if (n == 0 || (frame_branch_ == b.id && frame_sent_ == n)) return;
+  if (n == 0 || (frame_branch_ == b.id && frame_starts_ == b.starts && frame_sent_ == n)) return;
   if (!is_due && since(last_frame_) < kFrameInterval) return;
   last_frame_ = Clock::now();
   frame_sent_ = n;
   frame_branch_ = b.id;
+  frame_starts_ = b.starts;
   if (!watchers().empty()) send_frame(make_frame(b, n - 1));
 }
 

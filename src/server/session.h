@@ -159,7 +159,7 @@ class Session {
   Clock::time_point speed_start_, last_state_, last_frame_, last_reached_, last_look_, rate_start_, command_at_;
   double speed_time_ = 0, rate_time_ = 0, rate_ = 0;
   std::size_t frame_sent_ = 0;
-  int frame_branch_ = 0;
+  int frame_branch_ = 0, frame_starts_ = 0;
   Json last_state_told_;
   std::string file_sha256_;
 

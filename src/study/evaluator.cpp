@@ -13,6 +13,7 @@
 #include <set>
 
 #include "study/process.h"
+#include "uncertainty/mapping.h"
 
 namespace topple::study {
 namespace {
@@ -200,9 +201,10 @@ struct Reader {
       if (name.empty()) return refuse(find_member(line, name), "an output has no name", form);
       if (!v.is_number() && !v.is_null()) return refuse(find_member(line, name), name + ": a number is wanted", form);
       const double x = v.is_null() ? std::nan("") : v.get<double>();
-      if (!std::isfinite(x)) {
+      if (!(std::abs(x) <= uncertainty::most_value)) {
         a.kind = Answer::Kind::Failed;
-        a.text = name + " is not finite";
+        a.text = std::isfinite(x) ? fmt::format("{} is larger than {:.3g}", name, uncertainty::most_value)
+                                  : name + " is not finite";
       }
       a.outputs.emplace_back(name, x);
     }

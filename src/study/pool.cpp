@@ -92,10 +92,14 @@ void Pool::work(const std::string& name) {
         const std::lock_guard lock(mutex_);
         wakes = wake_count_;
       }
-      std::vector<Job> jobs = store.claim(name, options_.batch, options_.lease, options_.model);
+      const bool may_suspect = !has_suspect_.exchange(true);
+      std::vector<Job> jobs = store.claim(name, options_.batch, options_.lease, options_.model, may_suspect);
+      const bool is_suspect = may_suspect && !jobs.empty() && jobs.front().vanished >= suspect_vanished;
+      if (may_suspect && !is_suspect) has_suspect_ = false;
       if (!jobs.empty()) {
         pause = 0.01;
         run_jobs(store, name, std::move(jobs), runners);
+        if (is_suspect) has_suspect_ = false;
         continue;
       }
       if (now() - looked > 1) {

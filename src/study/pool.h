@@ -62,6 +62,7 @@ class Pool {
   PoolOptions options_;
   std::vector<std::string> names_;
   std::atomic<bool> stop_ = false;
+  std::atomic<bool> has_suspect_ = false;  // a thread holds one, or may be about to
   std::atomic<int> running_ = 0;
   std::atomic<long> finished_ = 0, too_late_ = 0, refused_ = 0, news_count_ = 0;
   std::atomic<double> last_work_ = 0;

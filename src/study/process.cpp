@@ -70,6 +70,7 @@ void Process::start(const std::string& command) {
     sigset_t none;
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, nullptr);
+    std::signal(SIGPIPE, SIG_DFL);
     if (dup2(in[0], 0) < 0 || dup2(out[1], 1) < 0 || dup2(error[1], 2) < 0) _exit(126);
     execv(words[0], const_cast<char**>(words));
     _exit(127);

@@ -105,6 +105,12 @@ class SqliteDatabase final : public Database {
       // it cannot agree with writers
     }
     close();
+    std::error_code unknown;
+    if (const auto size = std::filesystem::file_size(path_ + "-wal", unknown); !unknown && size > 0)
+      throw InputError(
+          "E820",
+          fmt::format("{} is not all of its study: runs of one that was interrupted lie in {}-wal", path_, path_),
+          "copy both files to a folder that may be written to, and read it there");
     std::string name = "file:";
     for (const char c : path_) {
       if (c == '%' || c == '?' || c == '#')

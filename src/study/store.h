@@ -21,6 +21,9 @@ inline constexpr int most_attempts = 3;
 /// Workers that vanished with a job after which it counts as failed: it may be what ends them, but healthy ones are
 /// killed too.
 inline constexpr int most_vanished = 10;
+/// From so many on a job is a suspect: it is held alone, and a process holds one of them at a time, so that what ends
+/// workers takes no others with it again and again.
+inline constexpr int suspect_vanished = 2;
 
 struct Job {
   std::string hash, model;
@@ -80,8 +83,10 @@ class Store {
   /// Takes up to `count` jobs that wait, or whose lease has run out, oldest first; raises their attempt before anything
   /// is run. `worker` holds nothing else. What threads of its process hold (names with the same part up to the last
   /// colon) is left to them, whatever their leases say.
-  ///   model  the only one that is wanted; empty: any
-  std::vector<Job> claim(const std::string& worker, int count, double lease, const std::string& model = {});
+  ///   model     the only one that is wanted; empty: any
+  ///   suspects  whether to take a suspect, which then comes alone
+  std::vector<Job> claim(const std::string& worker, int count, double lease, const std::string& model = {},
+                         bool suspects = true);
   /// Leases of all jobs that these workers still hold.
   void renew(const std::vector<std::string>& workers, double lease);
   /// Who holds jobs.

@@ -29,10 +29,12 @@ void settle(Result& r) {
     r.values.clear();
     return;
   }
-  const auto is_finite = [](double v) { return std::isfinite(v); };
-  if (std::all_of(r.values.begin(), r.values.end(), is_finite)) return;
+  const auto bad =
+      std::find_if_not(r.values.begin(), r.values.end(), [](double v) { return std::abs(v) <= most_value; });
+  if (bad == r.values.end()) return;
   r.state = Result::State::Failed;
-  r.text = "a value is not finite";
+  r.text = std::isfinite(*bad) ? fmt::format("a value is larger than {:.3g}", most_value)
+                               : std::string("a value is not finite");
   r.values.clear();
 }
 

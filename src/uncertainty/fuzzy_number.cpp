@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "uncertainty/mapping.h"
 
 namespace topple::uncertainty {
 namespace {
@@ -43,10 +44,8 @@ FuzzyNumber::FuzzyNumber(std::vector<AlphaCut> cuts) : cuts_(std::move(cuts)) {
   if (cuts_.size() < 2) refuse(fmt::format("{} cuts; at least two are needed", cuts_.size()));
   for (const auto& c : cuts_) {
     if (!std::isfinite(c.alpha) || !std::isfinite(c.left) || !std::isfinite(c.right)) refuse("a number is not finite");
-    // widths, and sums of two ends, must be numbers too
-    constexpr double most = std::numeric_limits<double>::max() / 4;
-    if (std::max(std::abs(c.left), std::abs(c.right)) > most)
-      refuse(fmt::format("a number is larger than {:.3g}", most));
+    if (std::max(std::abs(c.left), std::abs(c.right)) > most_value)
+      refuse(fmt::format("a number is larger than {:.3g}", most_value));
     if (c.left > c.right)
       refuse(fmt::format("at alpha {} the left end {} lies above the right end {}", c.alpha, c.left, c.right));
   }

@@ -2,6 +2,7 @@
 /// What the analysis sees of a model: points go in, results come out, many at a time.
 
 #include <functional>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -22,8 +23,12 @@ struct Result {
   std::string text;                // why it failed
 };
 
+/// Largest size of a value: widths, and sums of two, are numbers too.
+inline constexpr double most_value = std::numeric_limits<double>::max() / 4;
+
 /// The mapping model y = f(x). Fills out[i] for batch[i]; may use threads and vector lanes, and must give for a point
-/// what it gives for it alone. A result with values that are not finite counts as failed.
+/// what it gives for it alone. A result with values that are not finite, or larger than
+/// `most_value`, counts as failed.
 using Evaluate = std::function<void(std::span<const Point> batch, std::span<Result> out)>;
 
 /// Outcome class of a failed run.

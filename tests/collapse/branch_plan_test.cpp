@@ -162,6 +162,17 @@ TEST(BranchPlan, ForgetsCablesThatNeverPull) {
   EXPECT_EQ(late.left_out.size(), 1U);
 }
 
+TEST(LiveModel, GivesNoCableTheNameOfAnother) {
+  const std::string add = R"({"command": "add_cable", "member": "C-A2-1", "position": 1.5, "anchor": [-15, 4, 0],
+                          "stiffness": 2e6, "pretension": 5e4, "strength": 9e5})",
+                    let_go = R"({"command": "remove_cable", "cable": "added 1"})";
+  const product::Plan again = read(write_branch_plan(edited(staged(), {{0, add}, {0, add}, {0, let_go}})).text);
+  ASSERT_EQ(again.cables.size(), 1U);
+  ASSERT_EQ(again.cables.front().name, "added 2");
+  const LiveModel live = edited(again, {{0, add}});
+  EXPECT_EQ(live.plan().cables.back().name, "added 3");
+}
+
 TEST(BranchPlan, KeepsTheSectorsOfShafts) {
   std::string text;
   std::vector<Diagnostic> warnings;

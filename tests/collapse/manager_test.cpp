@@ -598,6 +598,29 @@ TEST(Manager, SaysWhereAChargeLiesInTheJointAtABeamsEnd) {
   EXPECT_EQ(complaint_of(beam("0.2 m", "0.4 m")), "");
 }
 
+TEST(Manager, SaysWhichBeamsLeaveAJointWithoutMass) {
+  const auto hidden = [](const std::string& height) {
+    const std::string section = "[section.hidden]\nwidth = \"60 cm\"\nheight = \"" + height +
+                                "\"\nconcrete = \"C25\"\nsteel = \"S\"\ncover = \"2 cm\"\nties = { diameter = \"8 "
+                                "mm\", spacing = \"15 cm\" }\ntop = \"3 x 12 mm\"\nbottom = \"3 x 12 mm\"\n";
+    return read(
+        materials() + section +
+        grid("A = \"0 m\", B = \"5 m\", C = \"10 m\"", "1 = \"0 m\", 2 = \"5 m\", 3 = \"10 m\"", 1) +
+        "[[columns]]\nsection = \"column\"\nexcept = [\"B2\"]\n[[beams]]\nsection = \"hidden\"\n[[slabs]]\npanel "
+        "= \"floor\"\n[[walls]]\npanel = \"thin\"\nat = \"A2B2\"\n" +
+        analysis());
+  };
+  try {
+    (void)build(hidden("15 cm"));
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_EQ(e.first_error().code, "E622");
+    EXPECT_GT(e.first_error().where.line, 0) << "the rule of its beams";
+    EXPECT_THAT(e.first_error().help, testing::HasSubstr("more depth than the slab"));
+  }
+  EXPECT_EQ(complaint_of(hidden("16 cm")), "");
+}
+
 TEST(Manager, OpeningsAboveEachOtherCountOnce) {
   const auto wall = [](const std::string& openings) {
     return build(read(materials() + grid("A = \"0 m\", B = \"5 m\"", "1 = \"0 m\"", 1) +

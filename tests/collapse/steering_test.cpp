@@ -1,5 +1,6 @@
 #include "collapse/steering.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -13,6 +14,7 @@
 #include "base/file.h"
 #include "base/hash.h"
 #include "collapse/action_log.h"
+#include "collapse/branch_plan.h"
 #include "collapse/branch_record.h"
 #include "collapse/edit_json.h"
 #include "collapse/run.h"
@@ -23,6 +25,10 @@ namespace {
 
 using record::expect_same_motion;
 using record::expect_same_words;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
 
 using Json = nlohmann::ordered_json;
 
@@ -582,6 +588,68 @@ TEST(Steering, EditsBeforeTheFirstStepDoNotHangOnTheirOrder) {
   const record::Record never = run({cable, off, later});
   ASSERT_EQ(never.position.size(), none.position.size());
   for (size_t i = 0; i < none.position.size(); ++i) EXPECT_NEAR(never.position[i], none.position[i], 1e-5);
+}
+
+TEST(Steering, ACutBeforeTheFirstStepIsInTheDeadLoad) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  s.fork("before");  // holds the frame of the uncut building
+  EXPECT_EQ(s.branch(2).first_frame, 1U);
+  s.switch_to(1);
+  const auto margin = [&s](int branch) {
+    for (const record::Finding& f : s.make_record(s.branch(branch)).findings)
+      if (f.id == "stability.start") return f.value;
+    return -1.0;
+  };
+  const double whole = margin(1);
+  const Edit cut = read_edit(Json::parse(
+      R"({"command": "add_pre_cut", "member": "B-A2B2-0", "at": 0.3, "cut_bars": 0.9, "cut_concrete": 0.5})"));
+  s.edit(cut);
+  const double weakened = margin(1);
+  EXPECT_LT(weakened, 0.9 * whole);
+  EXPECT_EQ(margin(2), whole);
+  EXPECT_EQ(s.branch(1).starts, 1);
+  EXPECT_EQ(s.branch(2).starts, 1) << "its frame is no longer that of its parent";
+  EXPECT_EQ(s.branch(2).first_frame, 0U);
+  advance_until(s, 0.05);
+  EXPECT_EQ(margin(1), weakened);
+  // as the plan that has it, about this axis
+  Steering planned(default_knowledge(), options());
+  ASSERT_TRUE(planned.begin(planned.add_root(read(write_branch_plan(s.branch(1).run().model()).text), "main")));
+  for (const record::Finding& f : planned.make_record(planned.active()).findings)
+    if (f.id == "stability.start") {
+      EXPECT_GE(f.value, weakened);
+      EXPECT_LT(f.value, 0.85 * whole);
+    }
+  s.switch_to(2);
+  s.edit(cut, "mine", true);
+  s.undo();
+  EXPECT_EQ(margin(2), whole);
+  EXPECT_EQ(s.branch(2).starts, 3);
+}
+
+TEST(Steering, ReportsTellThePlanAndTheEditsApart) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  s.edit(read_edit(Json::parse(R"({"command": "remove_charge", "charge": 0})")));
+  advance_until(s, 0.3);
+  s.edit(read_edit(Json::parse(R"({"command": "set_friction", "ground": 0.33})")), {}, true);
+  advance_until(s, 10);
+  const record::Record r = s.make_record(s.active());
+  EXPECT_THAT(s.active().run().model().map().stages.front(), EndsWith(": 2 charges")) << "of three";
+  for (const record::Finding& f : r.findings)
+    if (f.id == "events") {
+      EXPECT_THAT(f.text, HasSubstr("1 charge was taken out."));
+      EXPECT_THAT(f.text, Not(HasSubstr("as the plan says")));
+    }
+  std::vector<std::string> edits;
+  for (const record::KeyValue& v : r.plan_values) {
+    if (v.group == "Edits") edits.push_back(v.key + ": " + v.value);
+    if (v.key == "Friction and restitution") { EXPECT_THAT(v.value, Not(HasSubstr("0.33"))); }
+  }
+  ASSERT_EQ(edits.size(), 2U);
+  EXPECT_THAT(edits[0], StartsWith("Edit at 0 s: the charge on C-A1-0"));
+  EXPECT_THAT(edits[1], HasSubstr("0.33"));
 }
 
 TEST(Steering, RefusedEditsChangeNothing) {

@@ -259,6 +259,7 @@ TEST(Evaluator, ReadsFormsOfAnswers) {
   EXPECT_EQ(read(R"({"failed": ""})").kind, Kind::Failed);
   EXPECT_EQ(read(R"({"outputs": {"a": null}})").kind, Kind::Failed);
   EXPECT_EQ(read(R"({"outputs": {"a": null}})").text, "a is not finite");
+  EXPECT_EQ(read(R"({"outputs": {"a": -1e308}})").text, "a is larger than 4.49e+307");
 }
 
 TEST(Evaluator, PointsAtWhatItCannotUnderstand) {

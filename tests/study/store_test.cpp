@@ -101,7 +101,7 @@ TEST_P(Stores, TakeAnExpiredLeaseAndTheAnswerThatIsFirst) {
   store.add_jobs("m", {{"a", {1}}, {"b", {1}}});
   const std::vector<Job> slow = store.claim("slow", 2, 0);
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  const std::vector<Job> quick = store.claim("quick", 2, 60);
+  const std::vector<Job> quick = store.claim("quick", 2, 60);  // both are lost once only
   ASSERT_EQ(quick.size(), 2u);
   EXPECT_EQ(quick[0].attempt, 2);
   EXPECT_EQ(quick[0].vanished, 1);
@@ -171,6 +171,31 @@ TEST_P(Stores, PutAsideWhatCrashesThreeTimes) {
   EXPECT_EQ(store.rerun_failed("m"), 2);
   EXPECT_TRUE(store.find_results({"a", "b"}).empty());
   EXPECT_EQ(store.claim("w", 5, 60).size(), 2u);
+}
+
+// One of them ends whoever runs it: no other is to be taken for it.
+TEST_P(Stores, GiveWhatWasLostTwiceAlone) {
+  Store store(address);
+  store.add_jobs("m", {{"a", {1}}, {"b", {1}}, {"c", {1}}, {"d", {1}}});
+  int name = 0;
+  const auto lose = [&](int count) {
+    const std::vector<Job> jobs = store.claim("gone:" + std::to_string(++name) + ":0", count, 0);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    return jobs.size();
+  };
+  EXPECT_EQ(lose(3), 3u);
+  EXPECT_EQ(lose(3), 3u) << "lost once, as with a machine that went";
+  // a process takes one suspect at a time, and fresh ones beside it
+  const std::vector<Job> suspect = store.claim("w:0", 4, 60);
+  ASSERT_EQ(suspect.size(), 1u);
+  EXPECT_EQ(suspect[0].hash, "a");
+  EXPECT_EQ(suspect[0].vanished, suspect_vanished);
+  const std::vector<Job> fresh = store.claim("w:1", 4, 60, {}, false);
+  ASSERT_EQ(fresh.size(), 1u);
+  EXPECT_EQ(fresh[0].hash, "d");
+  EXPECT_TRUE(store.claim("w:2", 4, 60, {}, false).empty());
+  EXPECT_EQ(store.claim("v:0", 4, 60).at(0).hash, "b");
+  EXPECT_EQ(store.claim("u:0", 4, 60).at(0).hash, "c");
 }
 
 // Workers that were killed say nothing of a model that breaks off, and the other way round.

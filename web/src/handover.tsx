@@ -55,7 +55,13 @@ export function listConditions(run: Run): string[] {
     else if (isSpan) out.push(`${title}: spans bear less than the plan says. No margin is left.`);
     else out.push(`${title}: zones resist less than the plan says. No margin is left.`);
   }
-  for (const f of run.findings.filter((g) => g.id.startsWith("vibration.") && g.status === "warning")) out.push(`${f.title}: the ground shakes more than the middle of the screening's band, which reaches the limit.`);
+  for (const f of run.findings.filter((g) => g.id.startsWith("vibration.") && g.status === "warning")) {
+    const read = (found: RegExpExecArray | null): number => Number(found?.slice(1).find((n) => n !== undefined)?.replace(",", "."));
+    const middle = read(/, (\S+) in (?:the middle|der Mitte)/.exec(f.text));
+    const limit = read(/(?:of the plan|des Plans): (\S+) mm\/s|: (\S+) (?:to|bis) \S+ mm\/s \(/.exec(f.text));
+    if (middle > limit) out.push(`${f.title}: the middle of the screening's band is above the limit already.`);
+    else out.push(`${f.title}: the ground shakes more than the middle of the screening's band, which reaches the limit.`);
+  }
   const near = run.findings.filter((f) => f.id.startsWith("clearance.") && f.value !== null && f.value > 0 && f.status !== "bad");
   const ways = near.map((f) => {
     const limit = findLimit(f);
@@ -121,15 +127,35 @@ export function findFallenParts(run: Run): Point[][] {
   return out;
 }
 
+interface Box { lows: readonly [number, number]; highs: readonly [number, number] }
+
+function findBox(list: readonly Point[]): Box | undefined {
+  const points = list.filter((p) => Number.isFinite(p[0] + p[1]));
+  if (points.length === 0) return undefined;
+  const of = (k: number, pick: (a: number, b: number) => number): number => points.reduce((found, p) => pick(found, p[k] as number), (points[0] as Point)[k] as number);
+  return { lows: [of(0, Math.min), of(1, Math.min)], highs: [of(0, Math.max), of(1, Math.max)] };
+}
+const widen = (b: Box, by: number): Box => ({ lows: [b.lows[0] - by, b.lows[1] - by], highs: [b.highs[0] + by, b.highs[1] + by] });
+
+const longestName = 32; // [letters]
+const cutName = (name: string): string => ([...name].length > longestName ? `${[...name].slice(0, longestName - 1).join("")}…` : name);
+
 export function SitePlan(props: { run: Run }) {
   const { run } = props;
   const width = useChartWidth(640);
   const parts = findFallenParts(run);
   const { plans, hull } = findBuildingLines(run);
-  const points = [...run.building_outline, ...plans.flat(), ...run.neighbours.flatMap((n) => n.footprint), ...parts.flat()].filter((p) => Number.isFinite(p[0] + p[1]));
-  if (points.length === 0) return null;
-  const lows = [0, 1].map((k) => points.reduce((least, p) => Math.min(least, p[k] as number), Infinity)) as [number, number];
-  const highs = [0, 1].map((k) => points.reduce((most, p) => Math.max(most, p[k] as number), -Infinity)) as [number, number];
+  const own = findBox([...run.building_outline, ...plans.flat(), ...parts.flat()]);
+  const areas = run.neighbours.map((n) => findBox(n.footprint));
+  const known = own ?? areas.find((a) => a !== undefined);
+  if (known === undefined) return null;
+  // what is near, and of it what lies within the view: else the building would be a dot
+  const view = widen(known, 2 * Math.hypot(known.highs[0] - known.lows[0], known.highs[1] - known.lows[1]));
+  const isNear = areas.map((a) => a !== undefined && [0, 1].every((k) => (a.lows[k] as number) <= (view.highs[k] as number) && (a.highs[k] as number) >= (view.lows[k] as number)));
+  const near = run.neighbours.filter((_, i) => isNear[i]), far = run.neighbours.filter((_, i) => !isNear[i]);
+  const shown = [known, ...areas.filter((_, i) => isNear[i])] as Box[];
+  const lows = [0, 1].map((k) => Math.max(view.lows[k] as number, Math.min(...shown.map((b) => b.lows[k] as number)))) as [number, number];
+  const highs = [0, 1].map((k) => Math.min(view.highs[k] as number, Math.max(...shown.map((b) => b.highs[k] as number)))) as [number, number];
   const most = 460, margin = 34;
   const spans = [Math.max(1, highs[0] - lows[0]), Math.max(1, highs[1] - lows[1])] as const;
   const factor = Math.min((width - 2 * margin) / spans[0], (most - 2 * margin) / spans[1]);
@@ -158,18 +184,21 @@ export function SitePlan(props: { run: Run }) {
           <text class="axis-title" x={width - left} y={height - 3} text-anchor="end">x [m]</text>
           <text class="axis-title" x={left - 28} y={margin - 12}>y [m]</text>
         </g>
+        <clipPath id="site-plan-view"><rect x={left} y={margin} width={Math.max(0, width - 2 * left)} height={Math.max(0, height - 2 * margin)} /></clipPath>
         <path class="fallen" d={parts.map(path).join("")} />
-        {run.neighbours.map((n) => (
-          <path class={n.is_utility ? "utility-area" : "neighbour-area"} d={path(n.footprint)}><title data-name>{n.name}</title></path>
+        {near.map((n) => (
+          <path clip-path="url(#site-plan-view)" class={n.is_utility ? "utility-area" : "neighbour-area"} d={path(n.footprint)}><title data-name>{n.name}</title></path>
         ))}
         {hull.length > 0 && <path class="reach-line" d={path(hull)} />}
         <path class="footprint" d={plans.map(path).join("")} />
-        {run.neighbours.map((n) => {
+        {near.map((n) => {
           const corner = n.footprint[0];
-          return corner === undefined ? null : <text class="level-text" x={x(corner[0])} y={y(corner[1]) - 4} text-anchor={x(corner[0]) > 0.7 * width ? "end" : "start"} data-name>{n.name}</text>;
+          if (corner === undefined) return null;
+          const at = [0, 1].map((k) => Math.min(highs[k] as number, Math.max(lows[k] as number, corner[k] as number))) as [number, number];
+          return <text class="level-text" x={x(at[0])} y={y(at[1]) - 4} text-anchor={x(at[0]) > 0.6 * width ? "end" : "start"} data-name>{cutName(n.name)}<title>{n.name}</title></text>;
         })}
       </svg>
-      <p class="quiet plot-note">{plans.length > 0 ? "Strong line: the building before the first charge." : ""} {hull.length > 0 ? "Thin line: the convex outline around what charges act on, from which reaches count." : ""} Grey: all parts at the end of the run. No distance on this plan is a safe distance.</p>
+      <p class="quiet plot-note">{plans.length > 0 ? "Strong line: the building before the first charge." : ""} {hull.length > 0 ? "Thin line: the convex outline around what charges act on, from which reaches count." : ""} Grey: all parts at the end of the run. {far.length > 0 ? `Too far away to be drawn: ${far.map((n) => n.name).join(", ")}.` : ""} No distance on this plan is a safe distance.</p>
     </section>
   );
 }

@@ -186,10 +186,13 @@ export function makeSteerState(address: string) {
           break;
         case "branch": {
           const made = message["branch"] as Branch;
-          const isNew = !branches.value.some((b) => b.id === made.id);
+          const before = branches.value.find((b) => b.id === made.id);
           putBranch(made);
+          const run = runs.get(made.id);
+          if (before !== undefined && before.starts !== made.starts && run !== undefined) void renew(run);
+          if (before !== undefined && before.edits.length !== made.edits.length && made.id === active.value && phase.value !== "running") void readFindings();
           // What parts from the active branch is active from then on: its picture need not wait for the next state.
-          if (isNew && made.parent === active.value) void show(made.id);
+          if (before === undefined && made.parent === active.value) void show(made.id);
           break;
         }
         case "log":

@@ -45,6 +45,7 @@ export interface Branch {
   frontier: number;
   frames: number;
   first_frame: number;
+  starts: number; // how often its frames began anew
   duration: number;
   ending: Ending | null;
   charges: Charge[];

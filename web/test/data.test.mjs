@@ -406,6 +406,15 @@ describe("limits of the plan", () => {
     assert.deepEqual(tell(lands, shaken("bad")), ["It fails already: Ground vibration, Main.", "Parts are over it already: Main."]);
     assert.deepEqual(tell(shaken("warning")), ["Main: the ground shakes more than the middle of the screening's band, which reaches the limit."]);
     assert.deepEqual(tell(shaken("good")), []);
+    // the middle of the band against the limit, in both languages
+    const above = ["Main: the middle of the screening's band is above the limit already."];
+    const screening = (middle, limit) => tell({ ...shaken("warning"), text: `Screening: 5.4 to 34 mm/s, ${middle} in the middle, around 2.10 s from 3.0 MJ lost. Limit ${limit}: the band reaches it.` });
+    assert.deepEqual(screening("13", "of the plan: 5 mm/s"), above);
+    assert.equal(screening("4.9", "of the plan: 5 mm/s").length, 1);
+    assert.notDeepEqual(screening("4.9", "of the plan: 5 mm/s"), above);
+    assert.deepEqual(screening("13", "at the foundation between 2 Hz and 13 Hz: 5 to 5.8 mm/s (DIN 4150-3:1999-02, Table 1, residential buildings)"), above);
+    const german = "Abschätzung: 5,4 bis 34 mm/s, 13 in der Mitte, um 2,10 s. Anhaltswert am Fundament zwischen 2 Hz und 13 Hz: 5,5 bis 5,8 mm/s (DIN 4150-3:1999-02, Tabelle 1, Wohngebäude): Das Band erreicht ihn.";
+    assert.deepEqual(tell({ ...shaken("warning"), text: german }), above);
   });
 });
 

@@ -87,7 +87,7 @@ class Session {
     const { data } = makeCourse(second);
     const charged = data.bodies.filter((b) => b.kind === "column" && b.storey === 0 && /^C-[ABC]/.test(b.name));
     const info = {
-      id: this.branches.length + 1, name, parent: parent?.id ?? null, time: data.time[row], first_frame: row, duration: 12, ending: null,
+      id: this.branches.length + 1, name, parent: parent?.id ?? null, time: data.time[row], first_frame: row, starts: 0, duration: 12, ending: null,
       charges: parent?.charges.map((c) => ({ ...c, fired: !c.removed && c.time <= data.time[row] })) ?? charged.map((b, index) => ({
         index, stage: b.name[2] === "C" ? 1 : 0, member: b.name, position: 1.1, destroyed_length: 1.5, residual_bars: 0.1,
         time: b.name[2] === "C" ? 4 : 0.5, fired: false, fails: false, removed: false })),
