@@ -555,13 +555,27 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
   };
   bool yielded = false;
   double previous_eps = eps_0, previous_slope = 0, previous_step = 1;
+  // On the way from the last point in small steps; bars that are strained on the way know of it.
+  const auto creep = [&](double from, double to, double& e) {
+    constexpr int steps = 16;
+    e = previous_eps;
+    for (int i = 1; i <= steps; ++i) {
+      const double k = from + (to - from) * i / steps;
+      if (!find(packed, search, k, e, r)) return false;
+      for (size_t b = 0; b < rows; ++b) material::advance(f.bar_law[b], bars[b], e + k * f.bar_at[b]);
+      set_bars(packed, bars.data(), rows);
+    }
+    return true;
+  };
   for (size_t j = 1; j < kappa.size(); ++j) {
     const double k = origin + direction * kappa[j], step = kappa[j] - kappa[j - 1];
-    // Warm start along the tangent and its last change while the branch is far from its end.
+    // Warm start along the tangent and its last change while the branch is far from its end. Near it, where dN is
+    // small, they lead anywhere.
     const double slope = r.dN > 0 ? -r.dM / r.dN : 0, ahead = direction * step;
     double e = previous_eps;
     if (r.dN > 0) e += ahead * (slope + (j > 1 ? 0.5 * ahead * (slope - previous_slope) / previous_step : 0));
-    if (!find(packed, search, k, e, r)) break;
+    if (std::abs(e - previous_eps) > std::max(1e-4, step * f.half_depth)) e = previous_eps;
+    if (!find(packed, search, k, e, r) && !creep(origin + direction * kappa[j - 1], k, e)) break;
     out.moment[j] = std::max(0.0, direction * r.M);
     accept(e, k);
     if (!yielded && yields(e, k)) {
