@@ -29,6 +29,7 @@ constexpr double kSpacing = limits::line_spacing + 1e-3;  // of grid lines, whic
 const double kRound = std::sqrt(std::acos(-1.0) / 4);     // side of a square over the diameter of a circle of its area
 constexpr double kOverlap = 0.1;                          // of heights in which two elements stand side by side [m]
 constexpr double kOff = 0.6;                              // how far an element may lie off its place [m]
+constexpr double kLeast = 1 - 4e-4;                       // height of a storey, which is rounded to millimetres [m]
 
 /// Middles of groups of values that lie closer together than the spacing of grid lines.
 std::vector<double> find_lines(std::vector<double> values) {
@@ -240,12 +241,12 @@ class Planner {
     // the last floor: the storey nearest to the tops of columns, which may end below its slab or in a parapet
     double roof = top, off = 1;
     for (const auto& [name, z] : b_.storeys)
-      if (z > bottom + 1 && z < top + kOff && std::abs(z - top) < off) roof = z, off = std::abs(z - top);
+      if (z >= bottom + kLeast && z < top + kOff && std::abs(z - top) < off) roof = z, off = std::abs(z - top);
     // the others: the storeys between it and the feet of columns
     levels_.push_back(bottom);
     int close = 0;
     for (const auto& [name, z] : b_.storeys) {
-      if (z > levels_.back() + 1 && z < roof - 1) {
+      if (z >= levels_.back() + kLeast && z <= roof - kLeast) {
         levels_.push_back(z);
       } else if (z > levels_.back() + 0.05 && z < roof - 0.05) {
         ++close;
@@ -255,7 +256,7 @@ class Planner {
       guessed(fmt::format("{} storeys of the file lie less than 1 m from a floor and are left out", close));
     if (levels_.size() == 1) {
       for (const double z : find_lines(tops))
-        if (z > levels_.back() + 1 && z < roof - 1) levels_.push_back(z);
+        if (z >= levels_.back() + kLeast && z <= roof - kLeast) levels_.push_back(z);
       if (levels_.size() > 1) guessed("the file has no storeys where its columns stand: floors are where columns end");
     }
     levels_.push_back(roof);
@@ -292,7 +293,7 @@ class Planner {
                        frames_.size(), storeys()),
            "give a file of one building, and look at its unit");
     for (size_t s = 0; s + 1 < levels_.size(); ++s)
-      if (const double h = levels_[s + 1] - levels_[s]; !(h > 0.9996 && h < 50.0004))
+      if (const double h = levels_[s + 1] - levels_[s]; !(h > kLeast - 1e-9 && h < 50.0004))
         fail(fmt::format("storey {} would be {:.3f} m high; those of a plan are 1 m to 50 m", s, h),
              "look at the unit of the file, at its storeys and at the heights of its columns");
   }

@@ -335,6 +335,8 @@ TEST(ImportIfcStoreys, EndAtTheLastFloorNotAtParapetsOrBelowSlabs) {
   EXPECT_EQ(heights(5.8, {0, 3, 6}), "[\"3.000 m\", \"3.000 m\"]") << "the slab lies on the columns";
   EXPECT_EQ(heights(6, {0, 3}), "[\"3.000 m\", \"3.000 m\"]") << "no storey at the roof";
   EXPECT_EQ(heights(6, {0, 3, 3.4, 9}), "[\"3.000 m\", \"3.000 m\"]");
+  EXPECT_EQ(heights(6, {0, 1, 5, 6}), "[\"1.000 m\", \"4.000 m\", \"1.000 m\"]") << "as low as a plan has them";
+  EXPECT_EQ(heights(6, {0, 3, 3.999, 6}), "[\"3.000 m\", \"3.000 m\"]");
 }
 
 /// Beams of a frame of two storeys over the rows x = 0, 5 and 10 and the frames y = 0 and 6 without the column B2.
