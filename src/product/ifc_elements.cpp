@@ -12,60 +12,13 @@
 #include "base/error.h"
 #include "base/unit.h"
 #include "product/clip.h"
+#include "product/ifc_kinds.h"
 
 namespace topple::product {
 
 namespace {
 
 using Kind = StepValue::Kind;
-
-const std::set<std::string>& element_types() {
-  static const std::set<std::string> types{"IFCCOLUMN",
-                                           "IFCBEAM",
-                                           "IFCSLAB",
-                                           "IFCWALL",
-                                           "IFCWALLSTANDARDCASE",
-                                           "IFCFOOTING",
-                                           "IFCMEMBER",
-                                           "IFCCOLUMNSTANDARDCASE",
-                                           "IFCBEAMSTANDARDCASE",
-                                           "IFCSLABSTANDARDCASE",
-                                           "IFCSLABELEMENTEDCASE",
-                                           "IFCWALLELEMENTEDCASE",
-                                           "IFCPILE",
-                                           "IFCSTAIR",
-                                           "IFCROOF"};
-  return types;
-}
-
-/// Parts of buildings that are only counted.
-const std::set<std::string>& other_types() {
-  static const std::set<std::string> types{"IFCBEARING",
-                                           "IFCBUILDINGELEMENTCOMPONENT",
-                                           "IFCBUILDINGELEMENTPART",
-                                           "IFCBUILDINGELEMENTPROXY",
-                                           "IFCCAISSONFOUNDATION",
-                                           "IFCCHIMNEY",
-                                           "IFCCOVERING",
-                                           "IFCCURTAINWALL",
-                                           "IFCDEEPFOUNDATION",
-                                           "IFCDOOR",
-                                           "IFCDOORSTANDARDCASE",
-                                           "IFCMEMBERSTANDARDCASE",
-                                           "IFCPLATE",
-                                           "IFCPLATESTANDARDCASE",
-                                           "IFCRAILING",
-                                           "IFCRAMP",
-                                           "IFCRAMPFLIGHT",
-                                           "IFCREINFORCINGMESH",
-                                           "IFCSHADINGDEVICE",
-                                           "IFCSTAIRFLIGHT",
-                                           "IFCTENDON",
-                                           "IFCTENDONANCHOR",
-                                           "IFCWINDOW",
-                                           "IFCWINDOWSTANDARDCASE"};
-  return types;
-}
 
 /// Of its box, what the volume of a mesh has to fill to be taken for it. Walls have openings.
 constexpr double kFilled = 0.9, kFilledWall = 0.5;
@@ -110,7 +63,9 @@ class Reader {
     read_storeys();
     std::stable_sort(out_.storeys.begin(), out_.storeys.end(),
                      [](const auto& a, const auto& b) { return a.second < b.second; });
-    read_materials();
+    material_ = read_materials(file_);
+    for (const StepEntity* r : file_.of_type("IFCRELDEFINESBYTYPE"))
+      for (const StepValue& v : r->at(4).items) type_of_[v.id()] = r->at(5).id();
     for (const StepEntity* r : file_.of_type("IFCRELAGGREGATES"))
       for (const StepValue& part : r->at(5).items) whole_of_[part.id()] = r->at(4).id();
     for (const StepEntity* r : file_.of_type("IFCRELVOIDSELEMENT")) opened_[r->at(4).id()].push_back(get(r->at(5)));
@@ -946,36 +901,6 @@ class Reader {
     }
   }
 
-  void read_materials() {
-    for (const StepEntity* r : file_.of_type("IFCRELASSOCIATESMATERIAL"))
-      for (const StepValue& v : r->at(4).items) material_[v.id()] = name_of_material(r->at(5), 0);
-    for (const StepEntity* r : file_.of_type("IFCRELDEFINESBYTYPE"))
-      for (const StepValue& v : r->at(4).items) type_of_[v.id()] = r->at(5).id();
-  }
-  bool is_layer(const StepEntity* e) const { return is(e, "IFCMATERIALLAYER") || is(e, "IFCMATERIALLAYERWITHOFFSETS"); }
-  std::string name_of_material(const StepValue& v, int depth) const {
-    const StepEntity* e = get(v);
-    if (e == nullptr || depth > 6) return {};
-    if (e->type == "IFCMATERIAL") return e->at(0).text;
-    if (is_layer(e) || e->type == "IFCMATERIALLAYERSETUSAGE" || e->type == "IFCMATERIALPROFILESETUSAGE" ||
-        e->type == "IFCMATERIALPROFILESETUSAGETAPERING")
-      return name_of_material(e->at(0), depth + 1);
-    if (e->type == "IFCMATERIALPROFILE" || e->type == "IFCMATERIALPROFILEWITHOFFSETS" ||
-        e->type == "IFCMATERIALCONSTITUENT")
-      return name_of_material(e->at(2), depth + 1);
-    const StepValue& list = e->at(e->type == "IFCMATERIALPROFILESET" || e->type == "IFCMATERIALCONSTITUENTSET" ? 2 : 0);
-    // of several layers the thickest one carries, of constituents the largest share, or the first
-    double thickest = -1;
-    std::string name;
-    for (const StepValue& item : list.items) {
-      const StepEntity* layer = get(item);
-      const double t = is_layer(layer)                       ? layer->at(1).number
-                       : is(layer, "IFCMATERIALCONSTITUENT") ? layer->at(3).number
-                                                             : 0;
-      if (t > thickest) thickest = t, name = name_of_material(item, depth + 1);
-    }
-    return name;
-  }
   std::string material_of(int id) const {
     if (const auto own = material_.find(id); own != material_.end()) return own->second;
     if (const auto type = type_of_.find(id); type != type_of_.end())
