@@ -22,10 +22,13 @@ using Kind = StepValue::Kind;
 
 /// Of its box, what the volume of a mesh has to fill to be taken for it. Walls have openings.
 constexpr double kFilled = 0.9, kFilledWall = 0.5;
-constexpr double kLine = 0.3;      // columns less far apart stand in one line [m]
-constexpr double kFarthest = 1e8;  // coordinate of an element [m]
-constexpr double kNear = 1e-3;     // what a boundary has to lie around may stand out as far [m]
-constexpr double kStraight = 0.8;  // distance of a bar's ends over its length; ties are bent round
+constexpr double kLine = 0.3;           // columns less far apart stand in one line [m]
+constexpr double kFarthest = 1e8;       // coordinate of an element [m]
+constexpr double kNear = 1e-3;          // what a boundary has to lie around may stand out as far [m]
+constexpr double kStraight = 0.8;       // distance of a bar's ends over its length; ties are bent round
+constexpr int kMostItems = 10000;       // of a body or a bar, maps within maps counted each time
+constexpr size_t kMostPoints = 100000;  // of a composite curve, likewise
+constexpr const char* kTooMany = "its body has more than 10,000 items";
 
 /// What a body is made of. Points in world axes [m].
 struct Body {
@@ -280,7 +283,7 @@ class Reader {
         const StepEntity* segment = get(part);
         if (segment == nullptr) return false;
         std::vector<Vec3> points;
-        if (!find_points(segment->at(2), points, depth + 1)) return false;
+        if (!find_points(segment->at(2), points, depth + 1) || out.size() + points.size() > kMostPoints) return false;
         if (segment->at(1).text == "F") std::reverse(points.begin(), points.end());
         out.insert(out.end(), points.begin(), points.end());
       }
@@ -553,6 +556,10 @@ class Reader {
   bool find_item(const StepValue& v, const Map& X, Body& out, int depth) const {
     const StepEntity* e = get(v);
     if (depth > 10) out.why = "its body is nested too deeply";
+    if (++items_ > kMostItems) {
+      out.why = kTooMany;
+      return false;
+    }
     if (e == nullptr || depth > 10) return false;
     if (e->type == "IFCEXTRUDEDAREASOLID") {
       Solid solid;
@@ -704,6 +711,7 @@ class Reader {
       return out;
     }
     bool any = false, all = true;
+    items_ = 0;
     for (const StepValue& v : shape->at(2).items) {
       const StepEntity* r = get(v);
       if (r == nullptr || (r->at(1).kind == Kind::Text && r->at(1).text != "Body")) continue;
@@ -713,6 +721,7 @@ class Reader {
       }
     }
     out.is_partial |= any && !all;
+    if (items_ > kMostItems) out.why = kTooMany;
     measure_mesh(out);
     return out;
   }
@@ -1002,7 +1011,7 @@ class Reader {
   void find_disks(const StepValue& v, const Map& X, std::vector<std::vector<Vec3>>& out, double& radius,
                   int depth) const {
     const StepEntity* e = get(v);
-    if (e == nullptr || depth > 10) return;
+    if (++items_ > kMostItems || e == nullptr || depth > 10) return;
     if (e->type == "IFCSWEPTDISKSOLID" || e->type == "IFCSWEPTDISKSOLIDPOLYGONAL") {
       std::vector<Vec3> line;
       if (!find_points(e->at(0), line)) return;
@@ -1016,8 +1025,15 @@ class Reader {
       out.push_back({X_WP.p, X_WP * (e->at(3).number * out_.length_unit * direction(e->at(2), {0, 0, 1}))});
       radius = profile->at(3).number * out_.length_unit * std::cbrt(std::abs(determinant(X.M)));
     } else if (e->type == "IFCMAPPEDITEM") {
+      const int source = e->at(0).id();
+      if (std::find(open_maps_.begin(), open_maps_.end(), source) != open_maps_.end()) {
+        items_ = kMostItems + 1;
+        return;
+      }
+      open_maps_.push_back(source);
       for_mapped_items(*e, X,
                        [&](const StepValue& item, const Map& X_WI) { find_disks(item, X_WI, out, radius, depth + 1); });
+      open_maps_.pop_back();
     }
   }
 
@@ -1052,10 +1068,15 @@ class Reader {
       bar.has_place = placed.has_value();
       std::vector<std::vector<Vec3>> axes;
       double radius = 0;
+      items_ = 0;
       if (const StepEntity* shape = get(e->at(6)); shape != nullptr && placed)
         for (const StepValue& v : shape->at(2).items)
           if (const StepEntity* r = get(v); r != nullptr && r->at(1).text != "Axis")
             for (const StepValue& item : r->at(3).items) find_disks(item, X, axes, radius, 0);
+      if (items_ > kMostItems) {
+        ++out_.bars_left_out;
+        continue;
+      }
       if (bar.diameter <= 0) bar.diameter = 2 * radius;
       const bool is_told = !role.empty() && role != "NOTDEFINED" && role != "USERDEFINED";
       bar.is_main = !(role == "LIGATURE" || role == "SHEAR" || role == "RING");
@@ -1087,6 +1108,7 @@ class Reader {
 
   const StepFile& file_;
   mutable std::vector<int> open_maps_;  // sources of the mapped items that are being read
+  mutable int items_ = 0;               // of the body or bar that is being read
   const std::string& name_;
   IfcBuilding out_;
   double angle_unit_ = 1;  // of parameters of circles [rad]

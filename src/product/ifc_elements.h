@@ -50,6 +50,7 @@ struct IfcBuilding {
   std::vector<std::pair<std::string, double>> storeys;  // name, elevation [m], rising
   std::vector<IfcElement> elements;
   std::vector<IfcBar> bars;
+  int bars_left_out = 0;              // whose bodies have too many items or are part of themselves
   std::map<std::string, int> others;  // entities of other kinds, "IFCRAMP"
 };
 

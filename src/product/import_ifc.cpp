@@ -726,6 +726,8 @@ class Planner {
         left_out(e,
                  e.type == "IFCFOOTING" || e.type == "IFCPILE" ? "foundations belong to the ground" : "is not taken");
     for (const auto& [type, n] : b_.others) left_out_[kind_of(type) + ": is not taken"] += n;
+    if (b_.bars_left_out > 0)
+      left_out_["REINFORCINGBAR: its body is part of itself, or has more than 10,000 items"] += b_.bars_left_out;
     for (const auto& [what, n] : left_out_) missing(fmt::format("{} x {}", n, what));
   }
 

@@ -259,6 +259,72 @@ TEST(ImportIfcProfiles, ThatAreRoundedOrPartOfThemselves) {
   EXPECT_THAT(import("IFC4", w).report.missing, Contains(HasSubstr("its profile is nested too deeply")));
 }
 
+TEST(ImportIfcMaps, ThatMultiplyOrArePartOfThemselvesAreLeftOut) {
+  const auto map_of = [](Writer& w, const std::string& items, int turns, int each) {
+    std::string item = items;
+    const std::string origin = w.point(0, 0, 0), axes = w.add("IFCAXIS2PLACEMENT3D(" + origin + ",$,$)"),
+                      target = w.add("IFCCARTESIANTRANSFORMATIONOPERATOR3D($,$," + origin + ",$,$)");
+    for (int i = 0; i < turns; ++i) {
+      std::string list = item;
+      for (int k = 1; k < each; ++k) list += "," + item;
+      item = w.add("IFCMAPPEDITEM(" +
+                   w.add("IFCREPRESENTATIONMAP(" + axes + "," +
+                         w.add("IFCSHAPEREPRESENTATION($,'Body','MappedRepresentation',(" + list + "))") + ")") +
+                   "," + target + ")");
+    }
+    return item;
+  };
+  const auto bar_of = [](Writer& w, const std::string& item) {
+    w.add("IFCREINFORCINGBAR('g',$,'b',$,$," + w.placement("$", 0, 0, 0) + "," + w.shape("MappedRepresentation", item) +
+          ",$,'B500B',0.02,$,$,.MAIN.,$)");
+  };
+  Writer w;
+  w.metres();
+  add_square_columns(w);
+  // eight to the ninth power of them
+  const std::string circle = w.add("IFCCIRCLEPROFILEDEF(.AREA.,$,$,0.01)"),
+                    many = map_of(w, w.extrusion(circle, 1), 9, 8);
+  bar_of(w, many);
+  w.element("IFCCOLUMN", w.placement("$", 3, 0, 0), w.shape("MappedRepresentation", many));
+  // a map of ten of itself
+  const std::string last = w.point(0, 0, 0);
+  const auto next = [&last](int i) { return "#" + std::to_string(std::stoi(last.substr(1)) + i); };
+  const std::string own = next(5);
+  std::string list = own;
+  for (int k = 1; k < 10; ++k) list += "," + own;
+  w.add("IFCAXIS2PLACEMENT3D(" + last + ",$,$)");
+  w.add("IFCCARTESIANTRANSFORMATIONOPERATOR3D($,$," + last + ",$,$)");
+  w.add("IFCSHAPEREPRESENTATION($,'Body','MappedRepresentation',(" + list + "))");
+  w.add("IFCREPRESENTATIONMAP(" + next(1) + "," + next(3) + ")");
+  ASSERT_EQ(w.add("IFCMAPPEDITEM(" + next(4) + "," + next(2) + ")"), own);
+  bar_of(w, own);
+  // few of them are read
+  bar_of(w, map_of(w, w.extrusion(circle, 3), 2, 2));
+  const std::string text = ifc_file("IFC4", w.str());
+  EXPECT_EQ(read_ifc(text, "b.ifc").bars.size(), 4u);
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.report.missing,
+              Contains("2 x REINFORCINGBAR: its body is part of itself, or has more than 10,000 items"));
+  EXPECT_THAT(made.report.missing,
+              Contains("1 x COLUMN: only a part of its body is read: its body has more than 10,000 items"));
+}
+
+TEST(ImportIfcCurves, ThatMultiplyAreNotRead) {
+  Writer w;
+  w.metres();
+  add_square_columns(w);
+  std::string curve = w.add("IFCPOLYLINE((" + w.point(0, 0, 0) + "," + w.point(1, 0, 0) + "))");
+  for (int i = 0; i < 9; ++i) {
+    const std::string segment = w.add("IFCCOMPOSITECURVESEGMENT(.CONTINUOUS.,.T.," + curve + ")");
+    std::string list = segment;
+    for (int k = 1; k < 9; ++k) list += "," + segment;
+    curve = w.add("IFCCOMPOSITECURVE((" + list + "),.F.)");
+  }
+  w.element("IFCCOLUMN", w.placement("$", 3, 0, 0),
+            w.shape("SweptSolid", w.extrusion(w.add("IFCARBITRARYCLOSEDPROFILEDEF(.AREA.,$," + curve + ")"), 3)));
+  EXPECT_THAT(import("IFC4", w).report.missing, Contains("1 x COLUMN: its profile is IFCARBITRARYCLOSEDPROFILEDEF"));
+}
+
 TEST(ImportIfcReferences, ThatLeadNowhereAreRefused) {
   Writer w;
   w.metres();
