@@ -757,6 +757,7 @@ class Reader {
     if (body.shape.solids.empty()) {
       e.is_round =
           e.type == "IFCCOLUMN" && std::abs(size.x - size.y) < 0.02 * size.x && std::abs(filled - round) < 0.04;
+      if (e.is_round) e.diameter = find_diameter(body, 0.5 * (e.low + e.high));
       e.has_box = e.is_round || filled >= (e.type == "IFCWALL" ? kFilledWall : kFilled);
       if (!e.has_box) e.why = "its body is a mesh that is no upright box";
       if (e.has_box && e.type == "IFCWALL" && !lies_flat(body, e)) {
@@ -774,6 +775,7 @@ class Reader {
     const bool is_stretched =
         e.is_round && (is_column || e.type == "IFCBEAM") && std::abs(across - other) >= 0.02 * other;
     if (is_stretched) e.is_round = false;
+    if (e.is_round) e.diameter = find_diameter(body, 0.5 * (e.low + e.high));
     const bool is_panel = e.type == "IFCWALL" || e.type == "IFCSLAB";
     if (e.type == "IFCSLAB") find_outlines(body, e);
     if (!(is_panel ? lies_flat(body, e) : filled >= kFilled * (e.is_round ? round : 1))) {
@@ -785,6 +787,21 @@ class Reader {
     } else {
       e.has_box = true;
     }
+  }
+  /// Of the circle on which the corners of a round body lie, whose box hangs on the turn of its corners [m].
+  double find_diameter(const Body& body, const Vec3& middle) const {
+    double radius = 0;
+    for (const Solid& solid : body.shape.solids) {
+      const Loop& c = solid.loops.front();
+      if (const auto to_centre = find_centre(c.front(), c[c.size() / 3], c[2 * c.size() / 3]))
+        radius = std::max(radius, norm(*to_centre));
+    }
+    if (body.shape.solids.empty())
+      for (const Vec3& p : body.points) {
+        const Vec3 own = turn(p);
+        radius = std::max(radius, std::hypot(own.x - middle.x, own.y - middle.y));
+      }
+    return 2 * radius;
   }
   /// Of solids that may overlap, in world axes; their box is that of building axes [m³].
   double calc_volume(const std::vector<Solid>& solids, const Vec3& low, const Vec3& high) const {

@@ -23,6 +23,7 @@ struct IfcElement {
   bool is_cut = false;    // along planes
   bool is_whole = false;  // what cuts it is not read
   bool is_round = false;
+  double diameter = 0;  // of a round one [m]
   bool has_opening = false;
   int openings_not_read = 0;  // of a wall: those whose body is no upright box
   std::string why;

@@ -205,7 +205,7 @@ class Planner {
       if (!is_column && !is_slab && e.type != "IFCBEAM" && e.type != "IFCWALL") continue;
       const Vec3 size = e.high - e.low;
       const double across = std::min(size.x, size.y), thickness = is_slab ? size.z : across;
-      const double low = is_column ? across * (e.is_round ? kRound : 1) : std::min(across, size.z);
+      const double low = e.is_round ? kRound * e.diameter : is_column ? across : std::min(across, size.z);
       const double high = is_column ? std::max(size.x, size.y) : std::max(across, size.z);
       if (!e.has_box) {
         left_out(e, e.why.empty() ? "its body is no extruded profile" : e.why);
@@ -374,7 +374,7 @@ class Planner {
     const IfcElement* farthest = nullptr;
     for (const IfcElement* e : fit_["IFCCOLUMN"]) {
       double w = e->high.x - e->low.x, h = e->high.y - e->low.y;
-      if (e->is_round) w = h = kRound * w;
+      if (e->is_round) w = h = kRound * e->diameter;
       const Claim claim{e, group_of(columns_, *e, w, h), w * h};
       const Vec3 middle = 0.5 * (e->low + e->high);
       const int row = nearest(rows_, middle.x), frame = nearest(frames_, middle.y);
@@ -503,7 +503,7 @@ class Planner {
       if (hanging > 0) left_out(e, run.edges.empty() ? why : std::string("a span of it ") + why);
       if (run.edges.empty()) continue;
       double width = std::min(e.high.x - e.low.x, e.high.y - e.low.y), height = e.high.z - e.low.z;
-      if (e.is_round) width = height = kRound * width;
+      if (e.is_round) width = height = kRound * e.diameter;
       claims.all.push_back({&e, group_of(beams_, e, width, height), width * height});
       for (const std::string& edge : run.edges) claims.add(claims.all.back(), run.storey, edge);
     }

@@ -143,6 +143,18 @@ TEST(ImportIfcBoxes, OfRoundColumnsDoNotDependOnTheirTurn) {
             w.shape("SweptSolid", w.extrusion(w.add("IFCCIRCLEPROFILEDEF(.AREA.,$,$,0.2)"), 3)));
   // sqrt(pi) 20 cm = 35.4 cm
   EXPECT_THAT(import("IFC4", w).text, HasSubstr("width = \"35.4 cm\"\nheight = \"35.4 cm\""));
+  // outlined by a circle, whose corners lie on it
+  for (const double angle : {0.0, 11.25, 20.0, 45.0}) {
+    Writer c;
+    c.metres();
+    add_bay(c);
+    const std::string at = c.add("IFCAXIS2PLACEMENT2D(" + c.point(0, 0, 0) + ",$)"),
+                      circle = c.add("IFCCIRCLE(" + at + ",0.25)"),
+                      outline = c.add("IFCARBITRARYCLOSEDPROFILEDEF(.AREA.,$," + circle + ")");
+    c.element("IFCCOLUMN", turned(c, 10, 0, 0, angle * unit::deg), c.shape("SweptSolid", c.extrusion(outline, 3)));
+    // sqrt(pi) 25 cm = 44.3 cm
+    EXPECT_THAT(import("IFC4", c).text, HasSubstr("width = \"44.3 cm\"\nheight = \"44.3 cm\"")) << angle;
+  }
 }
 
 TEST(ImportIfcBoxes, GiveWayToTheOutlinesOfSlabs) {
