@@ -701,7 +701,7 @@ class Planner {
                               metres(h.sill), metres(h.right - h.left), metres(h.top - h.sill));
         places[{name_of("wall", g, true), list}][where.first].push_back(where.second);
       }
-    constexpr size_t most = 900;
+    const size_t most = 1000 - std::min<size_t>(1000, rules_of_walls_);
     size_t rules = 0;
     for (const auto& [what, by_storey] : places) {
       std::map<std::vector<std::string>, std::vector<int>> alike;
@@ -736,14 +736,28 @@ class Planner {
     return keys_.of(name);
   }
 
+  /// `0`, `"1..6"` or a list of these.
+  static std::string describe_storeys(const std::vector<int>& storeys) {
+    std::vector<std::string> parts;
+    for (size_t from = 0, to = 0; from < storeys.size(); from = ++to) {
+      while (to + 1 < storeys.size() && storeys[to + 1] == storeys[to] + 1) ++to;
+      parts.push_back(to == from ? std::to_string(storeys[from])
+                                 : fmt::format("\"{}..{}\"", storeys[from], storeys[to]));
+    }
+    return parts.size() == 1 ? parts.front() : fmt::format("[{}]", fmt::join(parts, ", "));
+  }
+  /// One rule for all storeys with the same places: a plan holds a thousand.
   void write_list(const std::map<int, std::vector<std::string>>& places, const char* rule, const char* what,
                   const std::string& name) {
-    for (const auto& [s, list] : places) {
-      std::set<std::string> unique(list.begin(), list.end());
-      std::string joined;
-      for (const std::string& p : unique) joined += (joined.empty() ? "\"" : ", \"") + p + "\"";
-      text_ += fmt::format("[[{}]]\n{} = \"{}\"\nstoreys = {}\nat = [{}]\n", rule, what, name, s, joined);
-    }
+    std::map<std::set<std::string>, std::vector<int>> alike;
+    for (const auto& [s, list] : places) alike[{list.begin(), list.end()}].push_back(s);
+    std::vector<std::pair<std::vector<int>, const std::set<std::string>*>> rules;
+    for (const auto& [list, storeys] : alike) rules.emplace_back(storeys, &list);
+    std::sort(rules.begin(), rules.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
+    for (const auto& [storeys, list] : rules)
+      text_ += fmt::format("[[{}]]\n{} = \"{}\"\nstoreys = {}\nat = [\"{}\"]\n", rule, what, name,
+                           describe_storeys(storeys), fmt::join(*list, "\", \""));
+    rules_of_walls_ += std::string(rule) == "walls" ? rules.size() : 0;
   }
 
   /// Bars of the first element of a group that has some.
@@ -988,6 +1002,7 @@ class Planner {
   std::vector<Group> columns_, beams_, slabs_, walls_;
   std::map<std::string, std::vector<const IfcElement*>> fit_;
   std::map<std::string, int> left_out_;
+  size_t rules_of_walls_ = 0;
   std::map<std::pair<int, std::string>, std::vector<Hole>> holes_;  // of walls, by storey and edge
   std::map<std::string, std::string> concretes_;                    // names by their keys
   Keys keys_;

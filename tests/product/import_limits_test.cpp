@@ -334,6 +334,25 @@ TEST(ImportIfcReferences, ThatLeadNowhereAreRefused) {
   EXPECT_THAT(complaint([&] { (void)import("IFC4", w); }), HasSubstr("refers to #99999, which is not there"));
 }
 
+TEST(ImportIfcRules, AreOneForAllStoreysWithTheSamePlaces) {
+  Writer w;
+  w.metres();
+  for (int s = 0; s < 60; ++s)
+    for (int i = 0; i < 18; ++i) {
+      const bool is_thinner = i == 0 && (s == 4 || s >= 58);
+      const double size = is_thinner ? 0.2 : 0.3 + 0.02 * i;
+      w.element("IFCCOLUMN", w.placement("$", 6 * (i % 6), 6 * (i / 6), 3 * s),
+                w.shape("SweptSolid", w.extrusion(w.rectangle(size, size), 3)));
+    }
+  const Import made = import("IFC4", w);
+  size_t rules = 0;
+  for (size_t at = 0; (at = made.text.find("[[columns]]", at)) != std::string::npos; ++at) ++rules;
+  EXPECT_EQ(rules, 19u);
+  EXPECT_THAT(made.text, HasSubstr("column_300x300_unknown\"\nstoreys = [\"0..3\", \"5..57\"]\nat = [\"A1\"]\n"));
+  EXPECT_THAT(made.text, HasSubstr("column_200x200_unknown\"\nstoreys = [4, \"58..59\"]\nat = [\"A1\"]\n"));
+  EXPECT_THAT(made.text, HasSubstr("column_640x640_unknown\"\nstoreys = \"0..59\"\nat = [\"F3\"]\n"));
+}
+
 TEST(ImportDxfSizes, ThatAPlanCannotHoldAreLeftOutOrRefused) {
   const auto drawing = [](const std::string& outlines) {
     return "0\nSECTION\n2\nENTITIES\n" + outlines + "0\nENDSEC\n0\nEOF\n";
