@@ -878,6 +878,11 @@ class Planner {
         }
         out += fmt::format("Ec = \"{:.1f} GPa\"  # 22 GPa ((fck + 8) / 10)^0.3\n", modulus);
         guessed(fmt::format("concrete {}: Ec from the class", key));
+        // a plan's own strain at the peak, 0.0022, would be too small
+        if (limits::least_peak_strain * fck > 2.2e-3 * 1000 * modulus) {
+          out += "eps_c1 = 0.0028  # as of C90/105\n";
+          guessed(fmt::format("concrete {}: eps_c1 = 0.0028, that of C90/105", key));
+        }
         if (fck == 8) {  // no formula gives it
           out += "fct = \"?\"\n";
           missing(fmt::format("concrete {}: fct", key));

@@ -44,6 +44,14 @@ TEST(ImportIfcClasses, LeaveAGapForATensileStrengthThatHasNoFormula) {
   EXPECT_THAT(import_of("C12/15").text, Not(HasSubstr("fct")));
 }
 
+TEST(ImportIfcClasses, OfHighStrengthHaveAStrainAtThePeakThatAPlanTakes) {
+  // Ec = 22 GPa 10.8^0.3 = 44.9 GPa: 1.05 fc / Ec = 0.00234
+  EXPECT_THAT(import_of("C100/115").text,
+              HasSubstr("Ec = \"44.9 GPa\"  # 22 GPa ((fck + 8) / 10)^0.3\neps_c1 = 0.0028"));
+  EXPECT_THAT(import_of("C100/115").report.guessed, Contains(HasSubstr("eps_c1 = 0.0028, that of C90/105")));
+  EXPECT_THAT(import_of("C90/105").text, Not(HasSubstr("eps_c1")));
+}
+
 TEST(ImportIfcClasses, OfLightweightConcreteLeaveGapsForWhatHangsOnItsDensity) {
   const Import made = import_of("LC25/28");
   EXPECT_THAT(made.text, HasSubstr("fc = \"25 N/mm2\""));
