@@ -1,8 +1,13 @@
 #include "product/ifc_reinforcement.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "product/plan_limits.h"
+#include "product/reading.h"
 
 namespace topple::product {
 
@@ -81,6 +86,7 @@ void find_column_bars(const std::vector<const IfcBar*>& bars, MemberBars& out) {
 
 void find_beam_bars(const std::vector<const IfcBar*>& bars, const IfcElement& e, MemberBars& out) {
   const double middle = 0.5 * (e.low.z + e.high.z), height = e.high.z - e.low.z;
+  double highest = 0, lowest = 0;  // over the middle
   for (const IfcBar* bar : bars) {
     const double z = bar->place.z - middle;
     if (std::abs(z) < kMiddle * height) {
@@ -89,6 +95,14 @@ void find_beam_bars(const std::vector<const IfcBar*>& bars, const IfcElement& e,
     }
     add(out.all, *bar);
     add(z > 0 ? out.top : out.bottom, *bar);
+    (z > 0 ? highest : lowest) = z > 0 ? std::max(highest, z) : std::min(lowest, z);
+  }
+  for (const IfcBar* bar : bars) {
+    const double z = bar->place.z - middle, off = z > 0 ? highest - z : z - lowest;
+    if (std::abs(z) < kMiddle * height || off <= bar->diameter) continue;
+    ++(z > 0 ? out.inner_top : out.inner_bottom);
+    double& depth = z > 0 ? out.depth_top : out.depth_bottom;
+    depth = std::max(depth, off);
   }
 }
 
@@ -130,6 +144,13 @@ void find_cover(const std::vector<const IfcBar*>& bars, const std::vector<const 
   if (!out.has_cover && out.ties.diameter > 0) measure(bars, out.ties.diameter);
 }
 
+/// Room from the middle of a section to the axes of bars, as far as cover and ties are known.
+double extent_of(double size, const MemberBars& bars, double diameter) {
+  const double cover = bars.has_cover ? bars.cover : 0,
+               tie = is_within(bars.ties.diameter, limits::tie_diameter) ? bars.ties.diameter : 0;
+  constexpr double rounding = 1e-3;  // the sides are written in millimetres
+  return 0.5 * (size - diameter - rounding) - cover - tie;
+}
 }  // namespace
 
 MemberBars find_bars(const IfcElement& e, const std::vector<IfcBar>& all) {
@@ -158,6 +179,38 @@ MemberBars find_bars(const IfcElement& e, const std::vector<IfcBar>& all) {
   find_spacing(ties, axes.along, out);
   find_cover(bars, ties, e, axes, out);
   return out;
+}
+
+void drop_thick_cover(MemberBars& bars, double width, double height) {
+  const double side = std::min(width, height) - 1e-3;
+  if (2 * bars.ties.diameter >= side) bars.ties.diameter = 0;
+  if (2 * (bars.cover + bars.ties.diameter) >= side) bars.has_cover = false;
+}
+
+std::string find_misfit(const MemberBars& bars, double width, double height, bool is_column) {
+  const double share = bars.all.count * std::acos(-1.0) / 4 * bars.all.diameter * bars.all.diameter / (width * height);
+  if (share > most_steel - 1e-3) return fmt::format("its bars, which take {:.1f} % of it", 100 * share);
+  const auto tell = [](const BarGroup& group, const char* where, const char* side) {
+    return fmt::format("its {} x {:.1f} mm {}, which do not fit into its {} side by side", group.count,
+                       1000 * group.diameter, where, side);
+  };
+  if (is_column) {
+    const double d = bars.all.diameter;
+    const int even = bars.all.count / 4 + 1;
+    const int count_y = bars.count_y > 0 ? bars.count_y : even, count_z = bars.count_z > 0 ? bars.count_z : even;
+    if (!have_room(count_y, d, extent_of(width, bars, d))) return tell(bars.all, "along the faces", "width");
+    if (!have_room(count_z, d, extent_of(height, bars, d))) return tell(bars.all, "along the faces", "height");
+    return {};
+  }
+  for (const auto& [group, where] : {std::pair{&bars.top, "above"}, std::pair{&bars.bottom, "below"}}) {
+    const double d = group->diameter;
+    if (!have_room(group->count, d, extent_of(width, bars, d))) return tell(*group, where, "width");
+  }
+  const double up = bars.top.diameter, down = bars.bottom.diameter;
+  if (extent_of(height, bars, up) + extent_of(height, bars, down) < 0.5 * (up + down) ||
+      std::min(extent_of(height, bars, up), extent_of(height, bars, down)) < 0)
+    return "its bars above and below, which do not fit into its height";
+  return {};
 }
 
 }  // namespace topple::product

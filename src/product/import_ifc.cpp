@@ -802,7 +802,7 @@ class Planner {
     return bars.count <= limits::bars && is_within(bars.diameter, limits::bar_diameter);
   }
 
-  void write_column_bars(const std::string& name, const MemberBars& bars) {
+  void write_column_bars(const std::string& name, const MemberBars& bars, const Group& g) {
     const int count = bars.all.count;
     if (count > 0 && !fits(bars.all)) {
       text_ += "bars = { count_y = \"?\", count_z = \"?\", diameter = \"?\" }\n";
@@ -816,6 +816,11 @@ class Planner {
                           count > 0 ? fmt::format("how its {} bars lie", count) : std::string("its bars")));
       return;
     }
+    if (const std::string misfit = find_misfit(bars, g.width, g.height, true); !misfit.empty()) {
+      text_ += "bars = { count_y = \"?\", count_z = \"?\", diameter = \"?\" }\n";
+      missing(fmt::format("section {}: {}", name, misfit));
+      return;
+    }
     const int even = count / 4 + 1;
     text_ +=
         fmt::format("bars = {{ count_y = {}, count_z = {}, diameter = {} }}\n", bars.count_y > 0 ? bars.count_y : even,
@@ -824,7 +829,7 @@ class Planner {
     if (bars.count_y == 0) guessed(fmt::format("section {}: its bars lie evenly on the four sides", name));
   }
 
-  void write_beam_bars(const std::string& name, const MemberBars& bars) {
+  void write_beam_bars(const std::string& name, const MemberBars& bars, const Group& g) {
     if (bars.middle > 0)
       missing(fmt::format("section {}: {} bars at the middle of its height are left out", name, bars.middle));
     if (bars.top.count == 0 || bars.bottom.count == 0 || !fits(bars.top) || !fits(bars.bottom)) {
@@ -832,20 +837,35 @@ class Planner {
       missing(fmt::format("section {}: its bars", name));
       return;
     }
+    if (const std::string misfit = find_misfit(bars, g.width, g.height, false); !misfit.empty()) {
+      text_ += "top = \"?\"\nbottom = \"?\"\n";
+      missing(fmt::format("section {}: {}", name, misfit));
+      return;
+    }
+    const auto tell_inner = [&](int inner, int count, double depth, const char* where) {
+      if (inner > 0)
+        guessed(
+            fmt::format("section {}: {} of its {} bars {} lie in further layers, up to {:.0f} mm behind the "
+                        "outermost one; all of them were taken in it",
+                        name, inner, count, where, 1000 * depth));
+    };
+    tell_inner(bars.inner_top, bars.top.count, bars.depth_top, "above");
+    tell_inner(bars.inner_bottom, bars.bottom.count, bars.depth_bottom, "below");
     const std::string top = describe(bars.top, name, "above"), bottom = describe(bars.bottom, name, "below");
     text_ += fmt::format("top = \"{}\"\nbottom = \"{}\"\n", top, bottom);
     taken(fmt::format("section {}: {} above, {} below", name, top, bottom));
   }
 
   void write_section(const std::string& name, const Group& g, bool is_column) {
-    const MemberBars bars = find_bars_of(g);
+    MemberBars bars = find_bars_of(g);
+    drop_thick_cover(bars, g.width, g.height);
     text_ += fmt::format("[section.{}]\nwidth = {}\nheight = {}\nconcrete = \"{}\"\nsteel = \"{}\"\n", name,
                          centimetres(g.width), centimetres(g.height), concrete_key(g.concrete), steel_key(bars.grade));
     write_cover_and_ties(name, bars);
     if (is_column) {
-      write_column_bars(name, bars);
+      write_column_bars(name, bars, g);
     } else {
-      write_beam_bars(name, bars);
+      write_beam_bars(name, bars, g);
     }
   }
 

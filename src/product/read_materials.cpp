@@ -129,8 +129,7 @@ double spread(int i, int count, double extent) { return count == 1 ? 0 : extent 
 
 /// Complains unless `count` bars find room side by side between the ties.
 void check_room(const TableReader& table, Place place, int count, double diameter, double extent, const char* side) {
-  const bool is_tight = count > 1 ? 2 * extent / (count - 1) < diameter : extent < 0;
-  if (is_tight)
+  if (!have_room(count, diameter, extent))
     table.error("E207", place,
                 std::to_string(count) + " bars do not fit into the " + side + " of the section between its ties",
                 "fewer or thinner bars, less cover, or a larger section");
@@ -219,7 +218,7 @@ Section read_section(Reading& reading, const Entry& entry) {
     for (Bar& bar : s.bars) bar.area *= ratio, bar.diameter *= std::sqrt(ratio);
   }
   table.finish();
-  if (s.steel_area() > 0.15 * s.area())
+  if (s.steel_area() > most_steel * s.area())
     table.error("E207", table.place_of(table.has("steel_area") ? "steel_area" : "bars"),
                 "the bars take more than 15 % of the section");
   return s;
@@ -269,6 +268,10 @@ Panel read_panel(Reading& reading, const Entry& entry, bool is_wall) {
 }
 
 }  // namespace
+
+bool have_room(int count, double diameter, double extent) {
+  return !(count > 1 ? 2 * extent / (count - 1) < diameter : extent < 0);
+}
 
 int find_named(const std::map<std::string, int>& known, const TableReader& table, const std::string& key,
                const std::string& name, const std::string& what) {

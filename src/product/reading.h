@@ -58,6 +58,11 @@ void try_samples(const Plan&, const Node& document, Complaints&);
 /// A plan from a document; the text of the plan is left empty. Without [fuzzy] if `is_sample`.
 Plan read_plan_document(const Node& document, const std::string& name, Complaints&, bool is_sample);
 
+/// Whether bars find room side by side, their axes from -extent to extent.
+bool have_room(int count, double diameter, double extent);
+/// Of a section, what its bars take at most.
+inline constexpr double most_steel = 0.15;
+
 /// Index of a named thing; -1 after a complaint, or without one if the name is empty.
 int find_named(const std::map<std::string, int>& known, const TableReader&, const std::string& key,
                const std::string& name, const std::string& what);
