@@ -2,6 +2,7 @@
 /// What an import takes over from files of other programs, made fit for a plan.
 
 #include <string>
+#include <vector>
 
 namespace topple::product {
 
@@ -15,5 +16,8 @@ std::string to_line_feeds(std::string);
 /// The last look at a plan or site that was made: only its gaps may be wrong with it. Throws InputError `code` at
 /// `file`.
 void check_import(const std::string& text, const char* code, const std::string& file);
+/// The same of a plan whose gaps hold values that fit; returns what is wrong with its building (members that hang in
+/// the air, E302 and above), which is for people to mend.
+std::vector<std::string> check_filled_import(const std::string& text, const char* code, const std::string& file);
 
 }  // namespace topple::product

@@ -171,8 +171,16 @@ class Planner {
         whole > 0)
       missing(fmt::format("{} elements are cut by bodies that are not read: they are taken whole", whole));
     write();
-    check_import(text_, "E112", file_);
+    tell_faults();
     return {std::move(text_), std::move(report_)};
+  }
+  /// What a plan of this building is refused for when its gaps are filled, as slabs that hang in the air.
+  void tell_faults() {
+    const std::vector<std::string> faults = check_filled_import(text_, "E112", file_);
+    constexpr size_t most_named = 10;
+    for (size_t i = 0; i < std::min(faults.size(), most_named); ++i)
+      missing("when its gaps are filled, the plan is still refused: " + faults[i]);
+    if (faults.size() > most_named) missing(fmt::format("the same for {} more reasons", faults.size() - most_named));
   }
 
  private:

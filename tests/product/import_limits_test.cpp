@@ -359,6 +359,33 @@ TEST(ImportIfcRules, AreOneForAllStoreysWithTheSamePlaces) {
   EXPECT_THAT(made.text, HasSubstr("column_300x300_unknown\"\nstoreys = [\"0..3\", \"5..57\"]\nat = [\"A1\"]\n"));
   EXPECT_THAT(made.text, HasSubstr("column_200x200_unknown\"\nstoreys = [4, \"58..59\"]\nat = [\"A1\"]\n"));
   EXPECT_THAT(made.text, HasSubstr("column_640x640_unknown\"\nstoreys = \"0..59\"\nat = [\"F3\"]\n"));
+  EXPECT_THAT(made.report.missing, Not(Contains(HasSubstr("still refused"))));
+}
+
+TEST(ImportIfcRules, AreLookedAtBehindTheGaps) {
+  // more sections than a plan has
+  Writer w;
+  w.metres();
+  for (int i = 0; i < 1001; ++i)
+    w.element("IFCCOLUMN", w.placement("$", 6 * (i % 32), 6 * (i / 32), 0),
+              w.shape("SweptSolid", w.extrusion(w.rectangle(0.3 + 0.003 * i, 0.3), 3)));
+  try {
+    import("IFC4", w);
+    ADD_FAILURE() << "was taken";
+  } catch (const InputError& e) {
+    EXPECT_EQ(e.diagnostics()[0].code, "E112");
+    EXPECT_THAT(e.diagnostics()[0].message, HasSubstr("section: more than 1000 entries"));
+  }
+  // a slab over a corner without a column
+  Writer s;
+  s.metres();
+  for (const double x : {0.0, 6.0, 12.0})
+    for (const double y : {0.0, 5.0})
+      if (x != 12 || y != 5)
+        s.element("IFCCOLUMN", s.placement("$", x, y, 0), s.shape("SweptSolid", s.extrusion(s.rectangle(0.4, 0.4), 3)));
+  s.element("IFCSLAB", s.placement("$", 6, 2.5, 2.8), s.shape("SweptSolid", s.extrusion(s.rectangle(12, 5), 0.2)));
+  EXPECT_THAT(import("IFC4", s).report.missing,
+              Contains(HasSubstr("when its gaps are filled, the plan is still refused: ")));
 }
 
 TEST(ImportDxfSizes, ThatAPlanCannotHoldAreLeftOutOrRefused) {
