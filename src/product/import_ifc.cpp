@@ -410,6 +410,15 @@ class Planner {
                       "moved by up to {:.1f} cm (#{})",
                       100 * most, farthest->id));
     tell_round(columns_, "columns");
+    tell_opened(columns_, "column");
+  }
+  void tell_opened(const std::vector<Group>& groups, const char* kind) {
+    int opened = 0;
+    for (const Group& g : groups)
+      for (const IfcElement* e : g.elements) opened += e->has_opening;
+    if (opened > 0)
+      missing(fmt::format("openings of {}: they are not read, the {}{} taken whole", count_words(opened, kind), kind,
+                          opened == 1 ? " is" : "s are"));
   }
   void tell_round(const std::vector<Group>& groups, const char* what) {
     for (const Group& g : groups)
@@ -518,6 +527,7 @@ class Planner {
     const int placed = settle(beams_, claims, "beams", "larger");
     if (placed > 0) tell_placed(placed, "beam", beams_.size(), "section");
     tell_round(beams_, "beams");
+    tell_opened(beams_, "beam");
   }
 
   static bool covers(const IfcElement& slab, double x, double y) {

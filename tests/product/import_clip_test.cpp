@@ -185,6 +185,21 @@ TEST(ImportIfcClip, TellsOpeningsOfSlabsAndLowWalls) {
   EXPECT_THAT(import("IFC4", w).report.missing, Contains("openings of 1 slab: they are not read"));
 }
 
+TEST(ImportIfcClip, TellsOpeningsOfBeamsAndColumns) {
+  Writer w;
+  w.metres();
+  const std::string columns = add_square_columns(w);
+  const std::string beam =
+      w.element("IFCBEAM", w.placement("$", 3, 0, 2.5), w.shape("SweptSolid", w.extrusion(w.rectangle(6, 0.3), 0.5)));
+  EXPECT_THAT(import("IFC4", w).report.missing, Not(Contains(HasSubstr("openings of"))));
+  w.add("IFCRELVOIDSELEMENT('g',$,$,$," + beam + ",#1)");
+  for (const std::string& column : {columns.substr(0, columns.find(',')), columns.substr(columns.rfind(',') + 1)})
+    w.add("IFCRELVOIDSELEMENT('g',$,$,$," + column + ",#1)");
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.report.missing, Contains("openings of 1 beam: they are not read, the beam is taken whole"));
+  EXPECT_THAT(made.report.missing, Contains("openings of 2 columns: they are not read, the columns are taken whole"));
+}
+
 TEST(ImportIfcClip, TakesOpeningsOfWallsBayByBay) {
   Writer w;
   w.metres();
