@@ -28,6 +28,7 @@ constexpr const char* kNoMaterial = "unknown";            // the key of concrete
 constexpr double kSpacing = limits::line_spacing + 1e-3;  // of grid lines, which are rounded [m]
 const double kRound = std::sqrt(std::acos(-1.0) / 4);     // side of a square over the diameter of a circle of its area
 constexpr double kOverlap = 0.1;                          // of heights in which two elements stand side by side [m]
+constexpr double kLack = 0.1;                             // of a bay or a storey, which is told when completed [m]
 constexpr double kOff = 0.6;                              // how far an element may lie off its place [m]
 constexpr double kLeast = 1 - 4e-4;                       // height of a storey, which is rounded to millimetres [m]
 
@@ -151,10 +152,11 @@ class Planner {
     }
     gather();
     find_grid();
-    place_columns();
+    const Claims columns = place_columns();
     const Claims walls = claim_walls();
     place_beams(walls);
     place_slabs();
+    tell_short_columns(columns);
     place_walls(walls);
     count_rest();
     if (const auto meshes = std::count_if(b_.elements.begin(), b_.elements.end(),
@@ -318,6 +320,9 @@ class Planner {
     return groups.size() - 1;
   }
 
+  /// Widths and heights, or thicknesses, as the plan has them, by storey and place.
+  using Sizes = std::map<std::pair<int, std::string>, std::pair<double, double>>;
+
   /// Who stands where in which storey: of several the larger one.
   struct Claim {
     const IfcElement* element = nullptr;
@@ -345,9 +350,11 @@ class Planner {
     }
   };
   /// Gives the groups their elements and places; says how many there are and who is left out.
-  int settle(std::vector<Group>& groups, const Claims& claims, const char* kind, const char* which) {
+  int settle(std::vector<Group>& groups, const Claims& claims, const char* kind, const char* which,
+             Sizes* sizes = nullptr) {
     std::set<const IfcElement*> standing;
     for (const auto& [where, claim] : claims.at) {
+      if (sizes != nullptr) (*sizes)[where] = {groups[claim.group].width, groups[claim.group].height};
       groups[claim.group].places[where.first].push_back(where.second);
       standing.insert(claim.element);
     }
@@ -376,7 +383,7 @@ class Planner {
     taken(fmt::format("{} in {}", count_words(placed, kind), count_words(static_cast<long long>(groups), group)));
   }
 
-  void place_columns() {
+  Claims place_columns() {
     Claims claims;
     double most = 0;  // that one is moved to its place
     const IfcElement* farthest = nullptr;
@@ -402,7 +409,7 @@ class Planner {
         left_out(*e, "reaches over less than half of every storey");
       }
     }
-    const int placed = settle(columns_, claims, "columns", "larger");
+    const int placed = settle(columns_, claims, "columns", "larger", &column_at_);
     tell_placed(placed, "column", columns_.size(), "section");
     if (most > 1e-3)
       guessed(
@@ -411,6 +418,7 @@ class Planner {
                       100 * most, farthest->id));
     tell_round(columns_, "columns");
     tell_opened(columns_, "column");
+    return claims;
   }
   void tell_opened(const std::vector<Group>& groups, const char* kind) {
     int opened = 0;
@@ -433,16 +441,22 @@ class Planner {
 
   /// Storey whose upper floor is nearest to a height; -1 if none is near.
   int storey_below(double z) const {
+    int best = -1;
+    double off = kOff;
     for (int s = 0; s < storeys(); ++s)
-      if (std::abs(levels_[static_cast<size_t>(s) + 1] - z) < kOff) return s;
-    return -1;
+      if (const double d = std::abs(levels_[static_cast<size_t>(s) + 1] - z); d < off) best = s, off = d;
+    return best;
   }
 
   double storey_height(int s) const { return levels_[static_cast<size_t>(s) + 1] - levels_[static_cast<size_t>(s)]; }
 
   /// Edges of the grid that an element runs along.
-  std::vector<std::string> edges_of(const IfcElement& e) const {
-    std::vector<std::string> out;
+  struct Edges {
+    std::vector<std::string> places;
+    bool has_loose_end = false;  // a part of a beam ends off the grid points: a cantilever
+  };
+  Edges edges_of(const IfcElement& e, std::optional<int> storey_of_beam = {}) const {
+    Edges out;
     const double dx = e.high.x - e.low.x, dy = e.high.y - e.low.y;
     const bool along_x = dx >= dy;
     const std::vector<double>&lines = along_x ? rows_ : frames_, &across = along_x ? frames_ : rows_;
@@ -450,12 +464,31 @@ class Planner {
     const double middle = 0.5 * (e.low[mid_axis] + e.high[mid_axis]);
     const int line = nearest(across, middle);
     if (std::abs(across[static_cast<size_t>(line)] - middle) > kOff) return out;
+    const auto point_at = [&](size_t i) {
+      const int a = static_cast<int>(i);
+      return along_x ? point(a, line) : point(line, a);
+    };
+    // how far from a grid point a beam may end: at the face of its column, or near it
+    const auto reach = [&](size_t i) {
+      const double half = std::max(half_column(*storey_of_beam, point_at(i), along_x),
+                                   half_column(*storey_of_beam + 1, point_at(i), along_x));
+      return std::max(kOff, half + 0.2);
+    };
+    std::optional<size_t> first, last;
     for (size_t i = 0; i + 1 < lines.size(); ++i) {
       const double covered = std::min(e.high[low_axis], lines[i + 1]) - std::max(e.low[low_axis], lines[i]);
       if (covered < 0.6 * (lines[i + 1] - lines[i])) continue;
-      const int a = static_cast<int>(i);
-      out.push_back(along_x ? point(a, line) + point(a + 1, line) : point(line, a) + point(line, a + 1));
+      if (storey_of_beam && (e.low[low_axis] > lines[i] + reach(i) || e.high[low_axis] < lines[i + 1] - reach(i + 1))) {
+        out.has_loose_end = true;
+        continue;
+      }
+      if (!first) first = i;
+      last = i + 1;
+      out.places.push_back(point_at(i) + point_at(i + 1));
     }
+    if (storey_of_beam && first)
+      out.has_loose_end |=
+          e.low[low_axis] < lines[*first] - reach(*first) || e.high[low_axis] > lines[*last] + reach(*last);
     return out;
   }
 
@@ -497,16 +530,18 @@ class Planner {
     std::set<std::pair<int, std::string>> carried;
     for (const IfcElement* e : fit_["IFCBEAM"]) {
       const int s = storey_below(e->high.z);
-      const auto edges = edges_of(*e);
+      const Edges edges = s < 0 ? Edges{} : edges_of(*e, s);
       if (s < 0) {
         left_out(*e, "its top is not level with a floor");
       } else if (e->high.z - e->low.z >= storey_height(s)) {
         left_out(*e, "is as deep as its storey is high");
-      } else if (edges.empty()) {
-        left_out(*e, "does not run between columns of the grid");
+      } else if (edges.places.empty()) {
+        left_out(*e, edges.has_loose_end ? "one end of it is far from the grid's points, as of a cantilever"
+                                         : "does not run between columns of the grid");
       } else {
-        runs.push_back({e, s, edges});
-        for (const std::string& edge : edges) carried.emplace(s, edge);
+        if (edges.has_loose_end) left_out(*e, "a part of it stands out beyond the last grid point, as a cantilever");
+        runs.push_back({e, s, edges.places});
+        for (const std::string& edge : edges.places) carried.emplace(s, edge);
       }
     }
     keep_carried(carried, walls);
@@ -524,10 +559,12 @@ class Planner {
       claims.all.push_back({&e, group_of(beams_, e, width, height), width * height});
       for (const std::string& edge : run.edges) claims.add(claims.all.back(), run.storey, edge);
     }
-    const int placed = settle(beams_, claims, "beams", "larger");
+    const int placed = settle(beams_, claims, "beams", "larger", &beam_at_);
     if (placed > 0) tell_placed(placed, "beam", beams_.size(), "section");
     tell_round(beams_, "beams");
     tell_opened(beams_, "beam");
+    tell_floors(claims, "beams");
+    tell_edges(claims, "beam", false);
   }
 
   static bool covers(const IfcElement& slab, double x, double y) {
@@ -569,9 +606,10 @@ class Planner {
         left_out(*e, "covers no cell of the grid");
       }
     }
-    const int placed = settle(slabs_, claims, "slabs", "thicker");
+    const int placed = settle(slabs_, claims, "slabs", "thicker", &slab_at_);
     if (placed > 0) {
       tell_placed(placed, "slab", slabs_.size(), "thickness");
+      tell_floors(claims, "slabs");
       int opened = 0;
       for (const Group& g : slabs_)
         for (const IfcElement* e : g.elements) opened += e->has_opening;
@@ -586,7 +624,7 @@ class Planner {
     Claims claims;
     for (const IfcElement* e : fit_["IFCWALL"]) {
       const double thickness = std::min(e->high.x - e->low.x, e->high.y - e->low.y);
-      const auto edges = edges_of(*e);
+      const std::vector<std::string> edges = edges_of(*e).places;
       const Claim claim{e, group_of(walls_, *e, thickness, 0), thickness};
       bool any = false;
       for (int s = 0; s < storeys() && !edges.empty(); ++s) {
@@ -607,28 +645,127 @@ class Planner {
     const int placed = settle(walls_, claims, "walls", "thicker");
     if (placed > 0) {
       tell_placed(placed, "wall", walls_.size(), "thickness");
+      tell_edges(claims, "wall", true);
       place_openings(claims);
     }
   }
 
-  /// Half of what a column takes of a wall's length, and what lies on the wall, as the plan has them; 0: nothing.
+  /// Half of what a column takes of the length of a wall or beam, and what lies on a wall or at the top of a column, as
+  /// the plan has them; 0: nothing.
   double half_column(int s, const std::string& place, bool along_x) const {
-    for (const Group& g : columns_)
-      if (holds(g, s, place)) return 0.5 * (along_x ? g.width : g.height);
-    return 0;
+    const auto column = column_at_.find({s, place});
+    return column == column_at_.end() ? 0 : 0.5 * (along_x ? column->second.first : column->second.second);
+  }
+  double depth_of_beam(int s, int row, int frame, bool along_x) const {
+    const auto beam = beam_at_.find({s, point(row, frame) + (along_x ? point(row + 1, frame) : point(row, frame + 1))});
+    return beam == beam_at_.end() ? 0 : beam->second.second;
+  }
+  double depth_of_slab(int s, int row, int frame) const {
+    const auto slab = slab_at_.find({s, point(row, frame) + point(row + 1, frame + 1)});
+    return slab == slab_at_.end() ? 0 : slab->second.first;
   }
   double depth_above(int s, int row, int frame, bool along_x) const {
+    double depth = depth_of_beam(s, row, frame, along_x);
+    for (const int side : {-1, 0})
+      depth = std::max(depth, depth_of_slab(s, row + (along_x ? 0 : side), frame + (along_x ? side : 0)));
+    return depth;
+  }
+  double depth_at(int s, int row, int frame) const {
     double depth = 0;
-    const auto look = [&](const std::vector<Group>& groups, const std::string& place, bool is_slab) {
-      for (const Group& g : groups)
-        if (holds(g, s, place)) depth = std::max(depth, is_slab ? g.width : g.height);
-    };
-    look(beams_, point(row, frame) + (along_x ? point(row + 1, frame) : point(row, frame + 1)), false);
     for (const int side : {-1, 0}) {
-      const int r = row + (along_x ? 0 : side), f = frame + (along_x ? side : 0);
-      if (r >= 0 && f >= 0) look(slabs_, point(r, f) + point(r + 1, f + 1), true);
+      depth = std::max({depth, depth_of_beam(s, row + side, frame, true), depth_of_beam(s, row, frame + side, false)});
+      for (const int other : {-1, 0}) depth = std::max(depth, depth_of_slab(s, row + side, frame + other));
     }
     return depth;
+  }
+
+  /// The largest of some values and whose it is.
+  struct Largest {
+    double value = 0;
+    const IfcElement* of = nullptr;
+    void note(double v, const IfcElement& e) {
+      if (v > value) value = v, of = &e;
+    }
+  };
+  void tell_moved(const Largest& moved, const char* kinds, const char* where) {
+    if (moved.value > 1e-3)
+      guessed(fmt::format("{} were moved to their {} by up to {:.1f} cm (#{})", kinds, where, 100 * moved.value,
+                          moved.of->id));
+  }
+  void tell_floors(const Claims& claims, const char* kinds) {
+    Largest moved;
+    for (const auto& [where, claim] : claims.at)
+      moved.note(std::abs(levels_[static_cast<size_t>(where.first) + 1] - claim.element->high.z), *claim.element);
+    tell_moved(moved, kinds, "floors");
+  }
+
+  /// Elements that fill only a part of what they take in the plan.
+  struct Partial {
+    std::set<const IfcElement*> elements;
+    Largest lacking;  // share
+    void note(double covered, double whole, const IfcElement& e) {
+      if (whole - covered < kLack) return;
+      elements.insert(&e);
+      lacking.note(1 - std::max(0.0, covered) / whole, e);
+    }
+  };
+  void tell_partial(const Partial& partial, const char* kind, const char* of) {
+    const auto n = std::ssize(partial.elements);
+    if (n > 0)
+      guessed(fmt::format("{} only a part of {} {}, {:.0f} % at least (#{}): {} completed",
+                          count_words(n, kind) + (n == 1 ? " fills" : " fill"), n == 1 ? "its" : "their",
+                          of + std::string(n == 1 ? "" : "s"), 100 * (1 - partial.lacking.value),
+                          partial.lacking.of->id, n == 1 ? "it was" : "they were"));
+  }
+  /// Those that stand in one place: the one that holds it, and those that go on where it ends.
+  static std::vector<const IfcElement*> all_at(const Claims& claims, const std::pair<int, std::string>& where,
+                                               const Claim& holder) {
+    std::vector<const IfcElement*> out{holder.element};
+    const auto [from, to] = claims.parts.equal_range(where);
+    for (auto part = from; part != to; ++part)
+      if (part->second.group == holder.group) out.push_back(part->second.element);
+    return out;
+  }
+  /// Notes by how much of a storey's height, below what lies above, elements stand.
+  void note_heights(Partial& partial, const std::vector<const IfcElement*>& elements, int s, double depth) const {
+    const double low = levels_[static_cast<size_t>(s)], high = levels_[static_cast<size_t>(s) + 1] - depth;
+    double covered = 0;
+    for (const IfcElement* e : elements) covered += std::max(0.0, std::min(e->high.z, high) - std::max(e->low.z, low));
+    partial.note(covered, high - low, *elements.front());
+  }
+  void tell_short_columns(const Claims& claims) {
+    Partial partial;
+    for (const auto& [where, claim] : claims.at) {
+      const auto p = points_of(where.second).front();
+      note_heights(partial, all_at(claims, where, claim), where.first, depth_at(where.first, p[0], p[1]));
+    }
+    tell_partial(partial, "column", "storey");
+  }
+  /// How far what stands along the grid was moved to its line, and what it fills of its bays between their columns.
+  void tell_edges(const Claims& claims, const char* kind, bool is_wall) {
+    Largest moved;
+    Partial of_bay, of_height;
+    for (const auto& [where, claim] : claims.at) {
+      const auto [s, place] = where;
+      const auto points = points_of(place);
+      const auto [row, frame] = points.front();
+      const bool along_x = points.back()[0] != row;
+      const int axis = along_x ? 0 : 1;
+      const std::vector<double>& lines = along_x ? rows_ : frames_;
+      const size_t i = static_cast<size_t>(along_x ? row : frame);
+      const double line = along_x ? frames_[static_cast<size_t>(frame)] : rows_[static_cast<size_t>(row)];
+      const double low = lines[i] + half_column(s, point(row, frame), along_x),
+                   high = lines[i + 1] - half_column(s, point(points.back()[0], points.back()[1]), along_x);
+      const auto elements = all_at(claims, where, claim);
+      for (const IfcElement* e : elements) {
+        moved.note(std::abs(0.5 * (e->low[1 - axis] + e->high[1 - axis]) - line), *e);
+        if (high > low) of_bay.note(std::min(e->high[axis], high) - std::max(e->low[axis], low), high - low, *e);
+      }
+      if (is_wall) note_heights(of_height, elements, s, depth_above(s, row, frame, along_x));
+    }
+    tell_moved(moved, fmt::format("{}s", kind).c_str(), "lines");
+    tell_partial(of_bay, kind, "bay");
+    if (is_wall) tell_partial(of_height, kind, "storey");
   }
   static bool holds(const Group& g, int s, const std::string& place) {
     const auto list = g.places.find(s);
@@ -1046,6 +1183,7 @@ class Planner {
   std::map<std::string, std::vector<const IfcElement*>> fit_;
   std::map<std::string, int> left_out_;
   size_t rules_of_walls_ = 0;
+  Sizes column_at_, beam_at_, slab_at_;
   std::map<std::pair<int, std::string>, std::vector<Hole>> holes_;  // of walls, by storey and edge
   std::map<std::string, std::string> concretes_;                    // names by their keys
   Keys keys_;

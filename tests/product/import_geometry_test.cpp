@@ -234,6 +234,48 @@ TEST(ImportIfcPlaces, TellHowFarColumnsAreMovedToTheirRow) {
   EXPECT_THAT(made.report.guessed, Contains(HasSubstr("columns were moved by up to 5.0 cm (#")));
 }
 
+TEST(ImportIfcPlaces, TellWhatIsMovedAndCompleted) {
+  Writer w;
+  w.metres();
+  for (const double x : {0.0, 6.0})
+    for (const double y : {0.0, 5.0}) block(w, "IFCCOLUMN", w.placement("$", x, y, 0), 0.4, 0.4, 3);
+  const std::string half = block(w, "IFCWALL", w.placement("$", 1.85, 0, 0), 3.7, 0.2, 3);
+  const std::string low = block(w, "IFCWALL", w.placement("$", 3, 5.55, 0), 6, 0.2, 1.6);
+  const std::string beside = block(w, "IFCBEAM", w.placement("$", 3, 0.55, 2.1), 6, 0.3, 0.5);
+  block(w, "IFCBEAM", w.placement("$", 1.85, 5, 1.95), 3.7, 0.3, 0.5);  // a cantilever
+  const std::string slab = block(w, "IFCSLAB", w.placement("$", 3, 2.5, 2.7), 6, 5, 0.2);
+  const Import made = import("IFC4", w);
+  // between the columns 3.5 m of 5.6 m, and 1.6 m below a slab of 20 cm
+  EXPECT_THAT(made.report.guessed,
+              Contains("1 wall fills only a part of its bay, 62 % at least (" + half + "): it was completed"));
+  EXPECT_THAT(made.report.guessed,
+              Contains("1 wall fills only a part of its storey, 57 % at least (" + low + "): it was completed"));
+  EXPECT_THAT(made.report.guessed, Contains("walls were moved to their lines by up to 55.0 cm (" + low + ")"));
+  EXPECT_THAT(made.report.guessed, Contains("beams were moved to their lines by up to 55.0 cm (" + beside + ")"));
+  EXPECT_THAT(made.report.guessed, Contains("beams were moved to their floors by up to 40.0 cm (" + beside + ")"));
+  EXPECT_THAT(made.report.guessed, Contains("slabs were moved to their floors by up to 10.0 cm (" + slab + ")"));
+  EXPECT_THAT(made.report.taken, Contains("1 beam in 1 section"));
+  EXPECT_THAT(made.report.missing,
+              Contains("1 x BEAM: one end of it is far from the grid's points, as of a cantilever"));
+}
+
+TEST(ImportIfcPlaces, AreThoseOfElementsThatFillThemWithoutAWord) {
+  Writer w;
+  w.metres();
+  for (const double x : {0.0, 6.0}) {
+    block(w, "IFCCOLUMN", w.placement("$", x, 0, 0), 0.4, 0.4, 2.5);  // below the beam
+    block(w, "IFCCOLUMN", w.placement("$", x, 5, 0), 0.4, 0.4, 3);
+    for (const double z : {0.0, 1.5})  // one wall in two lifts
+      block(w, "IFCWALL", w.placement("$", x, 2.5, z), 0.2, 4.6, 1.5);
+  }
+  block(w, "IFCWALL", w.placement("$", 3, 0, 0), 5.6, 0.2, 2.5);
+  block(w, "IFCBEAM", w.placement("$", 3, 0, 2.5), 5.6, 0.3, 0.5);
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.report.taken, Contains("5 walls in 1 thickness"));
+  EXPECT_THAT(made.report.guessed, Not(Contains(HasSubstr("completed"))));
+  EXPECT_THAT(made.report.guessed, Not(Contains(HasSubstr("moved"))));
+}
+
 /// A column whose body is mapped by the given operator.
 void add_mapped(Writer& w, double x, double y, const std::string& body, const std::string& target) {
   const std::string map = w.add("IFCREPRESENTATIONMAP(" + w.add("IFCAXIS2PLACEMENT3D(" + w.point(0, 0, 0) + ",$,$)") +
@@ -405,6 +447,47 @@ TEST(ImportIfcBeams, LoseTheSpansThatHangInTheAir) {
   EXPECT_THAT(made.report.taken, Contains("1 beam in 1 section"));
   EXPECT_THAT(made.report.missing,
               Contains("1 x BEAM: a span of it hangs in the air: no column or wall stands below its end"));
+}
+
+TEST(ImportIfcBeams, StandOnlyBetweenPointsOfTheGrid) {
+  // columns of 30 cm at x = 0, 5 and 10, and of 2 m along the row y = 6
+  const auto spans = [](double from, double to, double y = 0) {
+    Writer w;
+    w.metres();
+    for (const double x : {0.0, 5.0, 10.0}) {
+      block(w, "IFCCOLUMN", w.placement("$", x, 0, 0), 0.3, 0.3, 3);
+      block(w, "IFCCOLUMN", w.placement("$", x, 6, 0), 2, 0.3, 3);
+    }
+    block(w, "IFCBEAM", w.placement("$", 0.5 * (from + to), y, 2.5), to - from, 0.3, 0.5);
+    const Import made = import("IFC4", w);
+    const size_t rule = made.text.find("[[beams]]"), at = made.text.find("at = ", rule);
+    std::string out = rule == std::string::npos ? "" : made.text.substr(at + 5, made.text.find("\n", at) - at - 5);
+    for (const std::string& s : made.report.missing)
+      if (s.find("BEAM") != std::string::npos) out += " " + s.substr(s.find(": ") + 2);
+    return out;
+  };
+  const std::string none = " one end of it is far from the grid's points, as of a cantilever",
+                    part = " a part of it stands out beyond the last grid point, as a cantilever";
+  EXPECT_EQ(spans(0.15, 4.85), "[\"A1B1\"]");
+  EXPECT_EQ(spans(0.5, 4.5), "[\"A1B1\"]");
+  EXPECT_EQ(spans(0, 3.7), none);
+  EXPECT_EQ(spans(-2, 5), "[\"A1B1\"]" + part);
+  EXPECT_EQ(spans(0, 8.5), "[\"A1B1\"]" + part);
+  EXPECT_EQ(spans(0, 9.5), "[\"A1B1\", \"B1C1\"]");
+  EXPECT_EQ(spans(0.95, 4.05, 6), "[\"A2B2\"]") << "at the faces of wide columns";
+  EXPECT_EQ(spans(0.95, 4.05, 0), none);
+}
+
+TEST(ImportIfcBeams, StandBelowTheNearestFloor) {
+  Writer w;
+  w.metres();
+  for (const double z : {0.0, 3.0, 4.0, 7.0})
+    w.add("IFCBUILDINGSTOREY('g',$,'S',$,$," + w.placement("$", 0, 0, z) + ",$,$,.ELEMENT.," + std::to_string(z) + ")");
+  for (const double x : {0.0, 5.0}) block(w, "IFCCOLUMN", w.placement("$", x, 0, 0), 0.3, 0.3, 7);
+  block(w, "IFCBEAM", w.placement("$", 2.5, 0, 3.15), 5, 0.3, 0.4);  // 45 cm below 4 m, 55 cm above 3 m
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.text, HasSubstr("[[beams]]\nsection = \"beam_300x400_unknown\"\nstoreys = 1\n"));
+  EXPECT_THAT(made.report.guessed, Contains(HasSubstr("beams were moved to their floors by up to 45.0 cm (#")));
 }
 
 TEST(ImportIfcKinds, ThatAreNotTakenAreCounted) {
