@@ -6,7 +6,6 @@
 #include <iterator>
 #include <map>
 #include <optional>
-#include <regex>
 #include <set>
 
 #include "base/error.h"
@@ -14,6 +13,7 @@
 #include "base/words.h"
 #include "product/clip.h"
 #include "product/foreign_text.h"
+#include "product/ifc_names.h"
 #include "product/ifc_reinforcement.h"
 #include "product/import.h"
 #include "product/plan_limits.h"
@@ -83,62 +83,6 @@ std::vector<std::array<int, 2>> points_of(const std::string& place) {
 std::string metres(double x) { return fmt::format("\"{:.3f} m\"", std::abs(x) < 5e-4 ? 0.0 : x); }
 std::string centimetres(double x) { return fmt::format("\"{:g} cm\"", std::round(x * 1000) / 10); }
 std::string millimetres(double x) { return fmt::format("\"{:g} mm\"", std::round(x * 1e4) / 10); }
-
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-bool is_letter(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
-
-/// A class of Eurocode 2.
-struct ConcreteClass {
-  std::string name;  // "C20/25"
-  int fck = 0;       // [N/mm2]
-  bool is_light = false;
-};
-
-/// The first class in the name of a material: C8/10 to C100/115, LC likewise. Numbers beyond are no class.
-std::optional<ConcreteClass> find_class(const std::string& name) {
-  size_t at = 0;
-  const auto skip_blanks = [&] { at = std::min(name.size(), name.find_first_not_of(" \t", at)); };
-  const auto read_number = [&] {
-    const size_t from = at;
-    int number = 0;
-    for (; at < name.size() && is_digit(name[at]); ++at)
-      if (at - from < 3) number = 10 * number + (name[at] - '0');
-    return at - from > 3 ? 0 : number;
-  };
-  for (size_t c = name.find('C'); c != std::string::npos; c = name.find('C', c + 1)) {
-    const size_t first = c > 0 && name[c - 1] == 'L' ? c - 1 : c;
-    if (first > 0 && is_letter(name[first - 1])) continue;
-    at = c + 1;
-    skip_blanks();
-    const int fck = read_number();
-    skip_blanks();
-    if (at == name.size() || name[at] != '/') continue;
-    ++at;
-    skip_blanks();
-    const int cube = read_number();
-    if (fck < 8 || fck > 100 || cube < fck || cube > 130) continue;
-    return ConcreteClass{fmt::format("{}C{}/{}", first < c ? "L" : "", fck, cube), fck, first < c};
-  }
-  return std::nullopt;
-}
-
-/// Names of materials as keys of a plan, each of its own.
-class Keys {
- public:
-  const std::string& of(const std::string& name) {
-    const auto [known, is_new] = keys_.try_emplace(name);
-    if (!is_new) return known->second;
-    std::string key;
-    for (const char c : name.substr(0, 40)) key += is_letter(c) || is_digit(c) ? c : '_';
-    const std::string first = key;
-    for (int i = 2; !taken_.insert(key).second; ++i) key = first + "_" + std::to_string(i);
-    return known->second = key;
-  }
-
- private:
-  std::map<std::string, std::string> keys_;
-  std::set<std::string> taken_;
-};
 
 class Planner {
  public:
@@ -1078,20 +1022,6 @@ class Planner {
     return it == grades_.begin() ? "bars" : fmt::format("bars_{}", it - grades_.begin() + 1);
   }
 
-  /// Yield strength that a grade names in N/mm2: its only number of 200 to 690 (of 420/500 the first one); none in
-  /// other units.
-  static std::string find_yield(const std::string& grade) {
-    static const std::regex number(R"((?:^|[^0-9.,/])([2-6][0-9]0)(?![0-9]|[.,][0-9]))"),
-        other_units("psi|ksi", std::regex::icase);
-    if (std::regex_search(grade, other_units)) return {};
-    std::string found;
-    for (std::sregex_iterator m(grade.begin(), grade.end(), number), end; m != end; ++m) {
-      if (!found.empty() && found != (*m)[1].str()) return {};
-      found = (*m)[1].str();
-    }
-    return found;
-  }
-
   void write_steel(std::string& out) {
     std::vector<std::string> grades = grades_;
     if (grades.empty()) grades.emplace_back();
@@ -1109,11 +1039,6 @@ class Planner {
       }
       out += "fu = \"?\"\neps_u = \"?\"\n";
     }
-  }
-
-  static bool is_masonry(const std::string& name) {
-    static const std::regex words("brick|mason|mauer|ziegel|kalksand|klinker|metselwerk", std::regex::icase);
-    return std::regex_search(name, words);
   }
 
   void write() {
