@@ -79,7 +79,10 @@ class Reader {
       element.type = without_case(e.type);
       element.name = e.at(2).text;
       element.id = id;
-      element.material = material_of(id);
+      const IfcMaterial material = material_of(id);
+      element.material = material.name;
+      element.carrying = material.carrying * out_.length_unit;
+      element.layers = material.layers * out_.length_unit;
       element.has_opening = opened_.count(id) > 0;
       bodies.push_back(find_body(e));
       element.is_round = bodies.back().is_round;
@@ -927,7 +930,7 @@ class Reader {
     }
   }
 
-  std::string material_of(int id) const {
+  IfcMaterial material_of(int id) const {
     if (const auto own = material_.find(id); own != material_.end()) return own->second;
     if (const auto type = type_of_.find(id); type != type_of_.end())
       if (const auto of = material_.find(type->second); of != material_.end()) return of->second;
@@ -1074,7 +1077,7 @@ class Reader {
       const auto type_id = type_of_.find(e->id);
       const StepEntity* type = type_id == type_of_.end() ? nullptr : file_.find(type_id->second);
       if (!is(type, "IFCREINFORCINGBARTYPE")) type = nullptr;
-      bar.grade = e->at(8).text.empty() ? material_of(e->id) : e->at(8).text;
+      bar.grade = e->at(8).text.empty() ? material_of(e->id).name : e->at(8).text;
       bar.diameter = e->at(9).number * out_.length_unit;
       std::string role = e->at(12).text;
       if (role.empty() && type != nullptr) role = type->at(9).text;
@@ -1129,7 +1132,7 @@ class Reader {
   const std::string& name_;
   IfcBuilding out_;
   double angle_unit_ = 1;  // of parameters of circles [rad]
-  std::map<int, std::string> material_;
+  std::map<int, IfcMaterial> material_;
   std::map<int, int> type_of_, whole_of_;
   std::map<int, std::vector<const StepEntity*>> opened_;  // openings of elements
 };

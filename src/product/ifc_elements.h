@@ -17,6 +17,8 @@ struct IfcElement {
   std::string type;      // "IFCCOLUMN"
   std::string name;      // as the file has it
   std::string material;  // empty: none given
+  // of a material of layers: thickness of those of `material`, and of all [m]
+  double carrying = 0, layers = 0;
   int id = 0;
   bool has_box = false;   // false: its body is not understood, for the reason `why`
   bool is_mesh = false;   // the box was found around faces

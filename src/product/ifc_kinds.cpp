@@ -1,5 +1,9 @@
 #include "product/ifc_kinds.h"
 
+#include <vector>
+
+#include "product/ifc_names.h"
+
 namespace topple::product {
 
 const std::set<std::string>& element_types() {
@@ -57,36 +61,57 @@ const StepEntity* get(const StepFile& file, const StepValue& v) {
 bool is(const StepEntity* e, const char* type) { return e != nullptr && e->type == type; }
 bool is_layer(const StepEntity* e) { return is(e, "IFCMATERIALLAYER") || is(e, "IFCMATERIALLAYERWITHOFFSETS"); }
 
-std::string name_of_material(const StepFile& file, const StepValue& v, int depth) {
+/// Of several layers that which carries, and their thicknesses.
+IfcMaterial find_carrying(const StepFile& file, const std::vector<StepValue>& items) {
+  IfcMaterial out;
+  std::map<std::string, double> all;
+  bool carries = false;
+  double thickest = -1;
+  for (const StepValue& item : items) {
+    const StepEntity* layer = get(file, item);
+    if (!is_layer(layer)) continue;
+    const StepEntity* material = get(file, layer->at(0));
+    const std::string name = is(material, "IFCMATERIAL") ? material->at(0).text : "";
+    const double t = layer->at(1).number;
+    const bool is_structure = t > 0 && (find_class(name) || is_concrete(name) || is_masonry(name));
+    all[name] += t, out.layers += t;
+    if (carries && (!is_structure || t <= thickest)) continue;
+    if (!carries && !is_structure && t <= thickest) continue;
+    carries = is_structure, thickest = t, out.name = name;
+  }
+  out.carrying = all[out.name];
+  return out;
+}
+
+IfcMaterial find_material(const StepFile& file, const StepValue& v, int depth) {
   const StepEntity* e = get(file, v);
   if (e == nullptr || depth > 6) return {};
-  if (e->type == "IFCMATERIAL") return e->at(0).text;
+  if (e->type == "IFCMATERIAL") return {e->at(0).text, 0, 0};
   if (is_layer(e) || e->type == "IFCMATERIALLAYERSETUSAGE" || e->type == "IFCMATERIALPROFILESETUSAGE" ||
       e->type == "IFCMATERIALPROFILESETUSAGETAPERING")
-    return name_of_material(file, e->at(0), depth + 1);
+    return find_material(file, e->at(0), depth + 1);
   if (e->type == "IFCMATERIALPROFILE" || e->type == "IFCMATERIALPROFILEWITHOFFSETS" ||
       e->type == "IFCMATERIALCONSTITUENT")
-    return name_of_material(file, e->at(2), depth + 1);
+    return find_material(file, e->at(2), depth + 1);
+  if (e->type == "IFCMATERIALLAYERSET") return find_carrying(file, e->at(0).items);
   const StepValue& list = e->at(e->type == "IFCMATERIALPROFILESET" || e->type == "IFCMATERIALCONSTITUENTSET" ? 2 : 0);
-  // of several layers the thickest one carries, of constituents the largest share, or the first
-  double thickest = -1;
-  const StepValue* carrying = nullptr;
+  // of constituents the largest share, or the first
+  double largest = -1;
+  const StepValue* found = nullptr;
   for (const StepValue& item : list.items) {
-    const StepEntity* layer = get(file, item);
-    const double t = is_layer(layer)                       ? layer->at(1).number
-                     : is(layer, "IFCMATERIALCONSTITUENT") ? layer->at(3).number
-                                                           : 0;
-    if (t > thickest) thickest = t, carrying = &item;
+    const StepEntity* part = get(file, item);
+    const double share = is(part, "IFCMATERIALCONSTITUENT") ? part->at(3).number : 0;
+    if (share > largest) largest = share, found = &item;
   }
-  return carrying == nullptr ? std::string() : name_of_material(file, *carrying, depth + 1);
+  return found == nullptr ? IfcMaterial{} : find_material(file, *found, depth + 1);
 }
 
 }  // namespace
 
-std::map<int, std::string> read_materials(const StepFile& file) {
-  std::map<int, std::string> out;
+std::map<int, IfcMaterial> read_materials(const StepFile& file) {
+  std::map<int, IfcMaterial> out;
   for (const StepEntity* r : file.of_type("IFCRELASSOCIATESMATERIAL"))
-    for (const StepValue& v : r->at(4).items) out[v.id()] = name_of_material(file, r->at(5), 0);
+    for (const StepValue& v : r->at(4).items) out[v.id()] = find_material(file, r->at(5), 0);
   return out;
 }
 

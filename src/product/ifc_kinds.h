@@ -14,7 +14,12 @@ const std::set<std::string>& element_types();
 /// Parts of buildings that are only counted.
 const std::set<std::string>& other_types();
 
-/// Names of materials by the ids of elements and types.
-std::map<int, std::string> read_materials(const StepFile&);
+struct IfcMaterial {
+  std::string name;
+  double carrying = 0, layers = 0;  // thickness of the layers of this material, and of all [units of the file]
+};
+/// Materials by the ids of elements and types. Of several layers the thickest one of concrete or masonry carries, else
+/// the thickest one.
+std::map<int, IfcMaterial> read_materials(const StepFile&);
 
 }  // namespace topple::product

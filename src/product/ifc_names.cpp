@@ -58,6 +58,11 @@ bool is_masonry(const std::string& name) {
   return std::regex_search(name, words);
 }
 
+bool is_concrete(const std::string& name) {
+  static const std::regex words("concrete|beton", std::regex::icase);
+  return std::regex_search(name, words);
+}
+
 const std::string& Keys::of(const std::string& name) {
   const auto [known, is_new] = keys_.try_emplace(name);
   if (!is_new) return known->second;

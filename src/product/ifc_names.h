@@ -23,6 +23,8 @@ std::optional<ConcreteClass> find_class(const std::string& name);
 std::string find_yield(const std::string& grade);
 
 bool is_masonry(const std::string& name);
+/// Whether the name is a word for concrete, with a class or without.
+bool is_concrete(const std::string& name);
 
 /// Names of materials as keys of a plan, each of its own.
 class Keys {

@@ -149,6 +149,49 @@ class Planner {
     throw InputError(std::vector<Diagnostic>{{Severity::Error, "E112", {file_, 0, 0}, 1, what, help}});
   }
 
+  static double whole_thickness(const IfcElement& e) {
+    const Vec3 size = e.high - e.low;
+    return e.type == "IFCSLAB" ? size.z : std::min(size.x, size.y);
+  }
+  /// Whether the layers of a wall's or slab's material are those of its body.
+  static bool has_layers(const IfcElement& e) {
+    const double whole = whole_thickness(e);
+    return e.layers > 0 && std::abs(e.layers - whole) < 0.01 + 0.02 * whole;
+  }
+  /// That of the layers that carry.
+  static double thickness_of(const IfcElement& e) {
+    const double whole = whole_thickness(e);
+    return has_layers(e) && e.layers - e.carrying > 1e-3 ? std::min(e.carrying, whole) : whole;
+  }
+  void tell_layers(const std::vector<Group>& groups, const char* kind) {
+    struct Kind {
+      int layered = 0, whole = 0;
+    };
+    std::map<std::array<std::string, 3>, Kind> kinds;  // by their thicknesses and material
+    const auto in_mm = [](double x) { return fmt::format("{:.0f} mm", 1000 * x); };
+    for (const Group& g : groups)
+      for (const IfcElement* e : g.elements) {
+        const double whole = whole_thickness(*e);
+        if (!(e->layers - e->carrying > 1e-3) || std::abs(whole - e->carrying) < 1e-3) continue;
+        Kind& kind_of_it = kinds[{in_mm(whole), in_mm(e->carrying), clean_text(e->material)}];
+        ++(has_layers(*e) ? kind_of_it.layered : kind_of_it.whole);
+      }
+    for (const auto& [what, n] : kinds) {
+      const auto& [whole, carrying, material] = what;
+      const std::string of = material.empty() ? "a material without a name" : material;
+      if (n.layered > 0)
+        guessed(
+            fmt::format("{} of several layers, {} in all: {} of {} carry and were taken, the other layers are left "
+                        "out (their weight is a load)",
+                        count_words(n.layered, kind), whole, carrying, of));
+      if (n.whole > 0)
+        guessed(
+            fmt::format("{} of several layers, which do not add up to the thickness of the body, {}: all of it was "
+                        "taken as {}",
+                        count_words(n.whole, kind), whole, of));
+    }
+  }
+
   /// Elements with a body of a size that a plan can hold, by type.
   void gather() {
     const auto fits = [](double low, double high, const Range& range) {
@@ -158,7 +201,7 @@ class Planner {
       const bool is_column = e.type == "IFCCOLUMN", is_slab = e.type == "IFCSLAB";
       if (!is_column && !is_slab && e.type != "IFCBEAM" && e.type != "IFCWALL") continue;
       const Vec3 size = e.high - e.low;
-      const double across = std::min(size.x, size.y), thickness = is_slab ? size.z : across;
+      const double across = std::min(size.x, size.y), thickness = thickness_of(e);
       const double low = e.is_round ? kRound * e.diameter : is_column ? across : std::min(across, size.z);
       const double high = is_column ? std::max(size.x, size.y) : std::max(across, size.z);
       if (!e.has_box) {
@@ -524,7 +567,7 @@ class Planner {
     Claims claims;
     for (const IfcElement* e : fit_["IFCSLAB"]) {
       const int s = storey_below(e->high.z);
-      const double thickness = e->high.z - e->low.z;
+      const double thickness = thickness_of(*e);
       if (s < 0) {
         left_out(*e, "is not level with a floor above a storey (a base slab lies on the ground)");
         continue;
@@ -554,6 +597,7 @@ class Planner {
     if (placed > 0) {
       tell_placed(placed, "slab", slabs_.size(), "thickness");
       tell_floors(claims, "slabs");
+      tell_layers(slabs_, "slab");
       int opened = 0;
       for (const Group& g : slabs_)
         for (const IfcElement* e : g.elements) opened += e->has_opening;
@@ -567,7 +611,7 @@ class Planner {
   Claims claim_walls() {
     Claims claims;
     for (const IfcElement* e : fit_["IFCWALL"]) {
-      const double thickness = std::min(e->high.x - e->low.x, e->high.y - e->low.y);
+      const double thickness = thickness_of(*e);
       const std::vector<std::string> edges = edges_of(*e).places;
       const Claim claim{e, group_of(walls_, *e, thickness, 0), thickness};
       bool any = false;
@@ -590,6 +634,7 @@ class Planner {
     if (placed > 0) {
       tell_placed(placed, "wall", walls_.size(), "thickness");
       tell_edges(claims, "wall", true);
+      tell_layers(walls_, "wall");
       place_openings(claims);
     }
   }

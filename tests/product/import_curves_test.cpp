@@ -162,5 +162,53 @@ TEST(ImportIfcMaterials, OfConstituentsAreThatOfTheLargestShare) {
   EXPECT_THAT(import("IFC4", w).report.taken, Contains(HasSubstr("concrete C30_37: class C30/37")));
 }
 
+/// A wall of 35 cm and a slab of 30 cm over 6 m x 5 m, of a material of layers each.
+Import import_layers(const std::vector<std::pair<std::string, double>>& wall_layers,
+                     const std::vector<std::pair<std::string, double>>& slab_layers) {
+  Writer w;
+  w.metres();
+  w.material("C20/25", add_square_columns(w));
+  const auto associate = [&w](const std::string& element, const std::vector<std::pair<std::string, double>>& layers) {
+    std::string list;
+    for (const auto& [name, thickness] : layers)
+      list += (list.empty() ? "" : ",") + w.add("IFCMATERIALLAYER(" + w.add("IFCMATERIAL('" + name + "')") + "," +
+                                                std::to_string(thickness) + ",.F.)");
+    const std::string set = w.add("IFCMATERIALLAYERSET((" + list + "),$)");
+    w.add("IFCRELASSOCIATESMATERIAL('g',$,$,$,(" + element + ")," +
+          w.add("IFCMATERIALLAYERSETUSAGE(" + set + ",.AXIS2.,.POSITIVE.,0.)") + ")");
+  };
+  associate(
+      w.element("IFCWALL", w.placement("$", 3, 0, 0), w.shape("SweptSolid", w.extrusion(w.rectangle(6, 0.35), 3))),
+      wall_layers);
+  associate(
+      w.element("IFCSLAB", w.placement("$", 3, 2.5, 2.7), w.shape("SweptSolid", w.extrusion(w.rectangle(6, 5), 0.3))),
+      slab_layers);
+  return import("IFC4", w);
+}
+
+TEST(ImportIfcMaterials, OfLayersGiveTheThicknessOfThoseThatCarry) {
+  const Import made = import_layers({{"Mineral wool", 0.2}, {"C30/37", 0.1}, {"C30/37", 0.05}},
+                                    {{"Screed", 0.07}, {"EPS", 0.05}, {"Stahlbeton", 0.18}});
+  EXPECT_THAT(made.text, HasSubstr("[wall.wall_150_C30_37]\nthickness = \"15 cm\"\nconcrete = \"C30_37\""));
+  EXPECT_THAT(made.text, HasSubstr("[slab.slab_180_Stahlbeton]\nthickness = \"18 cm\""));
+  EXPECT_THAT(made.report.guessed,
+              Contains("1 wall of several layers, 350 mm in all: 150 mm of C30/37 carry and were taken, the other "
+                       "layers are left out (their weight is a load)"));
+  EXPECT_THAT(made.report.guessed,
+              Contains(HasSubstr("1 slab of several layers, 300 mm in all: 180 mm of Stahlbeton")));
+  // where no name says so, the thickest
+  EXPECT_THAT(import_layers({{"a", 0.1}, {"b", 0.25}}, {{"a", 0.3}}).text, HasSubstr("[wall.wall_250_b]"));
+}
+
+TEST(ImportIfcMaterials, OfLayersThatAreNotThoseOfTheBodyLeaveItWhole) {
+  const Import made = import_layers({{"Plaster", 0.02}, {"C30/37", 0.2}}, {{"Screed", 0.07}, {"C30/37", 0.3}});
+  EXPECT_THAT(made.text, HasSubstr("[wall.wall_350_C30_37]"));
+  EXPECT_THAT(made.text, HasSubstr("[slab.slab_300_C30_37]"));
+  EXPECT_THAT(made.report.guessed,
+              Contains("1 wall of several layers, which do not add up to the thickness of the body, 350 mm: all of it "
+                       "was taken as C30/37"));
+  EXPECT_THAT(made.report.guessed, Not(Contains(HasSubstr("1 slab of several layers"))));
+}
+
 }  // namespace
 }  // namespace topple::product
