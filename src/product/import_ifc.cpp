@@ -983,7 +983,9 @@ class Planner {
     }
     if (const std::string misfit = find_misfit(bars, g.width, g.height, false); !misfit.empty()) {
       text_ += "top = \"?\"\nbottom = \"?\"\n";
-      missing(fmt::format("section {}: {}", name, misfit));
+      const int inner = bars.inner_top + bars.inner_bottom;
+      missing(fmt::format("section {}: {}{}", name, misfit,
+                          inner > 0 ? fmt::format(" ({} of them in further layers)", inner) : ""));
       return;
     }
     const auto tell_inner = [&](int inner, int count, double depth, const char* where) {

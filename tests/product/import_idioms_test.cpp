@@ -166,6 +166,32 @@ TEST(ImportIfcIdioms, ReadsCoverTiesAndLayersWhereTheBarsLie) {
   EXPECT_THAT(made.report.missing, Contains(HasSubstr("cover, diameter of ties, spacing of ties")));
 }
 
+TEST(ImportIfcIdioms, TakesTwoLayersInOneWhereTheyFit) {
+  const auto import_beam = [](double width) {
+    Writer w;
+    w.metres();
+    add_square_columns(w);
+    const std::string beam = w.element("IFCBEAM", w.placement("$", 3, 0, 2.5),
+                                       w.shape("SweptSolid", w.extrusion(w.rectangle(6, width), 0.5)));
+    std::vector<std::vector<std::array<double, 3>>> bars;
+    for (const double z : {2.55, 2.6})
+      for (const double y : {-0.07, -0.025, 0.025, 0.07}) bars.push_back({{0.05, y, z}, {5.95, y, z}});
+    add_bars(w, beam, "MAIN", 0.025, bars);
+    add_bars(w, beam, "MAIN", 0.016, {{{0.05, -0.07, 2.95}, {5.95, -0.07, 2.95}}});
+    return import("IFC4", w);
+  };
+  const Import wide = import_beam(0.4), narrow = import_beam(0.19);
+  EXPECT_THAT(wide.text, HasSubstr("top = \"1 x 16 mm\"\nbottom = \"8 x 25 mm\""));
+  EXPECT_THAT(wide.report.guessed,
+              Contains("section beam_400x500_unknown: 4 of its 8 bars below lie in further layers, up to 50 mm behind "
+                       "the outermost one; all of them were taken in it"));
+  // 8 x 25 mm = 200 mm
+  EXPECT_THAT(narrow.text, HasSubstr("top = \"?\"\nbottom = \"?\""));
+  EXPECT_THAT(narrow.report.missing,
+              Contains("section beam_190x500_unknown: its 8 x 25.0 mm below, which do not fit into its width side by "
+                       "side (4 of them in further layers)"));
+}
+
 TEST(ImportIfcIdioms, LeavesAGapWhereTiesAreOutsideTheirColumn) {
   Writer w;
   w.metres();
