@@ -555,9 +555,12 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
   };
   bool yielded = false;
   double previous_eps = eps_0, previous_slope = 0, previous_step = 1;
-  // On the way from the last point in small steps; bars that are strained on the way know of it.
+  // From the last point in small steps, if there is an equilibrium at all; bars that are strained on the way know of
+  // it.
   const auto creep = [&](double from, double to, double& e) {
-    constexpr int steps = 16;
+    constexpr int steps = 64;
+    e = previous_eps;
+    if (!find(packed, search, to, e, r)) return false;
     e = previous_eps;
     for (int i = 1; i <= steps; ++i) {
       const double k = from + (to - from) * i / steps;
@@ -575,7 +578,8 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
     double e = previous_eps;
     if (r.dN > 0) e += ahead * (slope + (j > 1 ? 0.5 * ahead * (slope - previous_slope) / previous_step : 0));
     if (std::abs(e - previous_eps) > std::max(1e-4, step * f.half_depth)) e = previous_eps;
-    if (!find(packed, search, k, e, r) && !creep(origin + direction * kappa[j - 1], k, e)) break;
+    const bool is_led = e != previous_eps;
+    if (!find(packed, search, k, e, r) && !(is_led && creep(origin + direction * kappa[j - 1], k, e))) break;
     out.moment[j] = std::max(0.0, direction * r.M);
     accept(e, k);
     if (!yielded && yields(e, k)) {

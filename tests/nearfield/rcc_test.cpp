@@ -322,6 +322,42 @@ TEST(Rcc, FamiliesFollowTheirCurvesBetweenForces) {
   EXPECT_EQ(compared, 9);
 }
 
+// A tangent that led astray near the end of a branch ended curves that go on, 33 of these. Left are folds that steps of
+// one length meet and of another pass.
+TEST(Rcc, CurvesEndWhereFinerStepsDo) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> share(0, 1);
+  int ended = 0, early = 0;
+  for (int i = 0; i < 100; ++i) {
+    ZoneInput in = make_core();
+    in.concrete.fc = (10 + 35 * share(random)) * MPa;
+    in.concrete.eps_c1 = std::max(2.2e-3, 1.3 * in.concrete.fc / in.concrete.Ec);
+    in.steel.fy = (220 + 280 * share(random)) * MPa, in.steel.fu = 1.19 * in.steel.fy;
+    const double bars = 0.3 + share(random);
+    for (product::Bar& bar : in.section.bars) bar.area *= bars;
+    in.length = std::min(in.length, 0.9 * calc_largest_zone_length(in.concrete));
+    const Fibres f = make_fibres(in, Axis::Y);
+    const double crushing = find_crushing(f).force;
+    std::vector<double> kappa = make_rotations(in, in.section.height, f.cover);
+    for (double& k : kappa) k /= in.length;
+    for (const double N : make_forces(crushing, 0.3 * crushing)) {
+      const March march = march_curvature(f, N, 1, kappa);
+      if (march.last < 0 || static_cast<size_t>(march.last) + 1 >= kappa.size()) continue;
+      const size_t last = static_cast<size_t>(march.last);
+      double eps_0 = march.eps_0[last];
+      ++ended;
+      if (!find_equilibrium(f, N, march.origin + kappa[last + 1], eps_0, march.bars_at(last))) continue;
+      std::vector<double> fine{0};
+      for (size_t j = 0; j <= last; ++j)
+        for (int part = 1; part <= 40; ++part) fine.push_back(kappa[j] + (kappa[j + 1] - kappa[j]) * part / 40);
+      const March finer = march_curvature(f, N, 1, fine);
+      early += static_cast<size_t>(finer.last) + 1 == fine.size();
+    }
+  }
+  EXPECT_GT(ended, 500);
+  EXPECT_LE(early, 4);
+}
+
 TEST(Rcc, EffectiveStiffnessLiesBetweenCrackedAndGross) {
   const Rcc r = make_rcc(make_core());
   for (double N : {-4 * MN, -2.9 * MN, -1 * MN, 0.0}) {
