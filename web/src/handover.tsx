@@ -195,7 +195,7 @@ export function SitePlan(props: { run: Run }) {
           const corner = n.footprint[0];
           if (corner === undefined) return null;
           const at = [0, 1].map((k) => Math.min(highs[k] as number, Math.max(lows[k] as number, corner[k] as number))) as [number, number];
-          return <text class="level-text" x={x(at[0])} y={y(at[1]) - 4} text-anchor={x(at[0]) > 0.6 * width ? "end" : "start"} data-name>{cutName(n.name)}<title>{n.name}</title></text>;
+          return <text class="level-text" x={x(at[0])} y={y(at[1]) - 4} text-anchor={x(at[0]) > 0.6 * width ? "end" : "start"} data-name>{cutName(n.name)}<title data-name>{n.name}</title></text>;
         })}
       </svg>
       <p class="quiet plot-note">{plans.length > 0 ? "Strong line: the building before the first charge." : ""} {hull.length > 0 ? "Thin line: the convex outline around what charges act on, from which reaches count." : ""} Grey: all parts at the end of the run. {far.length > 0 ? `Too far away to be drawn: ${far.map((n) => n.name).join(", ")}.` : ""} No distance on this plan is a safe distance.</p>

@@ -518,7 +518,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["stands on no beam and on no column", "steht auf keinem Balken und keiner Stütze"],
   ["stands on nothing", "steht auf nichts"],
   ["the plan has no members that stand", "der Plan hat keine Bauteile, die stehen"],
-  ["a joint without mass", "ein Knoten ohne Masse"],
+  ["a joint without mass: beams no deeper than their slab end there, and no column", "ein Knoten ohne Masse: Dort enden Balken, die nicht höher als ihre Decke sind, und keine Stütze"],
   ["cable {}: {n} was taken out", "Seil {}: {} wurde herausgenommen"],
   ["cable {}: nothing to tie it to", "Seil {}: nichts, woran es befestigt werden kann"],
   ["leave at least 0.3 m of the shaft between them, or give them the same position", "mindestens 0,3 m des Schafts dazwischen lassen oder dieselbe Stelle angeben"],

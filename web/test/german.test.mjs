@@ -111,7 +111,7 @@ describe("the German table", () => {
       for (const file of files) {
         const text = await readFile(`${root}src/${folder}/${file}.cpp`, "utf8");
         // what is refused: below
-        const told = text.replace(/\/\/.*/g, "").replace(/\b(?:InputError|runtime_error|complain|demand|refuse)\b[\s\S]*?;\n/g, "");
+        const told = text.replace(/\/\/.*/g, "").replace(/\b(?:InputError|runtime_error|complain|complaints|demand|refuse)\b[\s\S]*?;\n/g, "");
         for (const part of findMissing(told, 3)) missing.push(`${folder}/${file}.cpp: ${part}`);
       }
     assert.deepEqual(missing, []);
