@@ -198,7 +198,7 @@ export function SitePlan(props: { run: Run }) {
           return <text class="level-text" x={x(at[0])} y={y(at[1]) - 4} text-anchor={x(at[0]) > 0.6 * width ? "end" : "start"} data-name>{cutName(n.name)}<title data-name>{n.name}</title></text>;
         })}
       </svg>
-      <p class="quiet plot-note">{plans.length > 0 ? "Strong line: the building before the first charge." : ""} {hull.length > 0 ? "Thin line: the convex outline around what charges act on, from which reaches count." : ""} Grey: all parts at the end of the run. {far.length > 0 ? `Too far away to be drawn: ${far.map((n) => n.name).join(", ")}.` : ""} No distance on this plan is a safe distance.</p>
+      <p class="quiet plot-note">{plans.length > 0 ? "Strong line: the building before the first charge." : ""} {hull.length > 0 ? "Thin line: the convex outline around what charges act on, from which reaches count." : ""} {far.length > 0 ? `Too far away to be drawn: ${far.map((n) => n.name).join(", ")}.` : ""} Grey: all parts at the end of the run. No distance on this plan is a safe distance.</p>
     </section>
   );
 }
