@@ -301,14 +301,14 @@ int exit_code_of(const record::Record& r, bool failed_report) {
 }
 
 int close_run(const record::Record& r, const Arguments& a, std::FILE* out, Files files) {
-  bool failed_report = false;
-  for (auto& f : write_files(r, a, failed_report)) files.push_back(std::move(f));
-  print_findings(out, r);
+  print_findings(out, r);  // first: a disk that is full leaves them
   std::fprintf(out, "\n%s Computed in %.1f s.\n", r.ending_text.c_str(), r.provenance.wall_time);
   for (const record::Finding& f : r.findings)
     if (collapse::is_violated(f) || collapse::is_not_judged(f))
       std::fprintf(out, "%s: %s (%s)\n", collapse::is_violated(f) ? "Violated" : "Not judged", f.title.c_str(),
                    f.heading.c_str());
+  bool failed_report = false;
+  for (auto& f : write_files(r, a, failed_report)) files.push_back(std::move(f));
   const int code = exit_code_of(r, failed_report);
   for (const auto& [what, path] : files) std::fprintf(out, "Wrote %s\n", path.c_str());
   print_leftovers(out, a, files);

@@ -368,7 +368,8 @@ Steering::Made Steering::undo() {
     const bool is_anew = from.pieces.front().run != entry.before.front().run;
     from.pieces = entry.before;
     from.edits.pop_back();
-    if (is_anew) start_anew(from, entry.first_frame);
+    const bool is_shared = from.parent > 0 && branch(from.parent).pieces.front().run == from.pieces.front().run;
+    if (is_anew) start_anew(from, is_shared ? entry.first_frame : 0);
     go_live();
     watch(from);
     made.branch = &from;
@@ -383,7 +384,7 @@ Steering::Made Steering::undo() {
   b.edits.assign(from.edits.begin(), from.edits.end() - 1);
   b.sample = from.sample;
   b.pieces.push_back({go_on(b.pieces, b.pieces.back().run->model_pointer(), false), 0, 0, 0});
-  b.first_frame = count_shared(b);
+  b.first_frame = b.pieces.front().run == from.pieces.front().run ? count_shared(b) : 0;
   made.branch = &add_branch(std::move(b));
   return made;
 }

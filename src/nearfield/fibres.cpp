@@ -557,9 +557,9 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
   double previous_eps = eps_0, previous_slope = 0, previous_step = 1;
   // From the last point in small steps, if there is an equilibrium at all; bars that are strained on the way know of
   // it.
-  const auto creep = [&](double from, double to, double& e) {
+  const auto creep = [&](double from, double to, double start, double& e) {
     constexpr int steps = 64;
-    e = previous_eps;
+    e = start;
     if (!find(packed, search, to, e, r)) return false;
     e = previous_eps;
     for (int i = 1; i <= steps; ++i) {
@@ -575,11 +575,14 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
     // Warm start along the tangent and its last change while the branch is far from its end. Near it, where dN is
     // small, they lead anywhere.
     const double slope = r.dN > 0 ? -r.dM / r.dN : 0, ahead = direction * step;
-    double e = previous_eps;
-    if (r.dN > 0) e += ahead * (slope + (j > 1 ? 0.5 * ahead * (slope - previous_slope) / previous_step : 0));
-    if (std::abs(e - previous_eps) > std::max(1e-4, step * f.half_depth)) e = previous_eps;
-    const bool is_led = e != previous_eps;
-    if (!find(packed, search, k, e, r) && !(is_led && creep(origin + direction * kappa[j - 1], k, e))) break;
+    double led = previous_eps;
+    if (r.dN > 0) led += ahead * (slope + (j > 1 ? 0.5 * ahead * (slope - previous_slope) / previous_step : 0));
+    const bool is_far = std::abs(led - previous_eps) > std::max(1e-4, step * f.half_depth);
+    double e = is_far ? previous_eps : led;
+    const double other = is_far ? led : previous_eps;
+    if (!find(packed, search, k, e, r) &&
+        !(led != previous_eps && creep(origin + direction * kappa[j - 1], k, other, e)))
+      break;
     out.moment[j] = std::max(0.0, direction * r.M);
     accept(e, k);
     if (!yielded && yields(e, k)) {

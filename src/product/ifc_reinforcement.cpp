@@ -182,9 +182,10 @@ MemberBars find_bars(const IfcElement& e, const std::vector<IfcBar>& all) {
 }
 
 void drop_thick_cover(MemberBars& bars, double width, double height) {
-  const double side = std::min(width, height) - 1e-3;
+  // room for two thin bars side by side, and for ties that are not known
+  const double side = std::min(width, height) - 8e-3;
   if (2 * bars.ties.diameter >= side) bars.ties.diameter = 0;
-  if (2 * (bars.cover + bars.ties.diameter) >= side) bars.has_cover = false;
+  if (2 * (bars.cover + (bars.ties.diameter > 0 ? bars.ties.diameter : 4e-3)) >= side) bars.has_cover = false;
 }
 
 std::string find_misfit(const MemberBars& bars, double width, double height, bool is_column) {

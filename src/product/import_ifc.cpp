@@ -459,7 +459,7 @@ class Planner {
     const auto reach = [&](size_t i) {
       const double half = std::max(half_column(*storey_of_beam, point_at(i), along_x),
                                    half_column(*storey_of_beam + 1, point_at(i), along_x));
-      return std::max(kOff, half + 0.2);
+      return std::max(kOff, half + 0.2 + limits::line_spacing);  // a column may have been moved to its line
     };
     std::optional<size_t> first, last;
     for (size_t i = 0; i + 1 < lines.size(); ++i) {

@@ -626,6 +626,13 @@ TEST(Steering, ACutBeforeTheFirstStepIsInTheDeadLoad) {
   s.undo();
   EXPECT_EQ(margin(2), whole);
   EXPECT_EQ(s.branch(2).starts, 3);
+  EXPECT_EQ(s.branch(2).first_frame, 0U) << "main has begun anew meanwhile";
+  // a branch without the cut has a frame of its own
+  s.switch_to(1);
+  s.undo();
+  EXPECT_EQ(s.active().id, 3);
+  EXPECT_EQ(s.active().first_frame, 0U);
+  EXPECT_EQ(margin(3), whole);
 }
 
 TEST(Steering, ReportsTellThePlanAndTheEditsApart) {

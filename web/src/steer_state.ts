@@ -378,9 +378,13 @@ export function makeSteerState(address: string) {
 
   /// The branch has another model now: its scene and its frames are read again.
   async function renew(old: BranchRun): Promise<void> {
-    if (renewing.has(old.id)) return;
-    renewing.add(old.id);
+    if (renewing.has(old.id)) {
+      renewing.set(old.id, true);
+      return;
+    }
+    renewing.set(old.id, false);
     const answer = await ask<{ scene: unknown }>("scene", { branch: old.id });
+    const isAgain = renewing.get(old.id) === true; // it began anew meanwhile
     renewing.delete(old.id);
     if (answer === undefined || runs.get(old.id) !== old) return;
     const run = new BranchRun(old.id, answer.scene, look);
@@ -391,9 +395,10 @@ export function makeSteerState(address: string) {
       useRun(run);
       if (!following.value) wanted = time;
     }
+    if (isAgain) void renew(run);
     fill();
   }
-  const renewing = new Set<number>();
+  const renewing = new Map<number, boolean>();
 
   // While an edit is on its way the processors are for it, not for pictures of what it leaves.
   let editedAt = -Infinity; // [ms]
