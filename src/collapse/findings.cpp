@@ -591,11 +591,9 @@ void add_vibration(const Context& c, const Mechanism& m) {
     if (n.vibration_limit > 0)
       text += fmt::format(". Limit of the plan: {:g} mm/s", least / unit::mm);
     else if (least > 0)
-      text += fmt::format(
-          ". Limit at the foundation between {:g} Hz and {:g} Hz: {:.3g} to {:.3g} mm/s (DIN 4150-3:1999-02, Table 1, "
-          "{})",
-          law.low_frequency, law.high_frequency, least / unit::mm, most / unit::mm,
-          describe_vibration_limit(n.building_class));
+      text += fmt::format(". Limit at the foundation between {:g} Hz and {:g} Hz: {:.3g} to {:.3g} mm/s ({}; {})",
+                          law.low_frequency, law.high_frequency, least / unit::mm, most / unit::mm, kVibrationSource,
+                          describe_vibration_limit(n.building_class));
     Status status = Status::Info;
     if (least > 0) {
       status = high < least ? Status::Good : low > most ? Status::Bad : Status::Warning;

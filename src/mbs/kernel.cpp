@@ -299,7 +299,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
   V3<D> lever_a, lever_b;
   M33<D> axes;     // halfway between F and M, of a member between both laid along its chord
   N sine, cosine;  // of their turn in the plane
-  N s2, over_sine, coefficient;
+  N s2, over_sine;
   // the way from F to M without a member; the vector of the quaternion of the turn, of a member its twist; twice the
   // inverse of the squared length of the sum of both quaternions, which lies halfway
   V3<D> way, v;
@@ -337,10 +337,8 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
     const PlanarTurn<D> apart_by = turned.back().then(at_b.turn);
     v.y = {hn::CopySign(apart_by.y.v, hn::Xor(apart_by.y.v, apart_by.w.v))};
     s2 = v.y * v.y;
-    if constexpr (is_member) {
-      turning<D>(s2, over_sine, coefficient);
-    } else {
-      halve(apart_by.w);
+    halve(apart_by.w);
+    if constexpr (!is_member) {
       const auto sign = hn::CopySign(zero.v, apart_by.w.v);
       const N sum_w = turned.w + N{hn::Xor(at_b.turn.w.v, sign)}, sum_y = turned.y + N{hn::Xor(at_b.turn.y.v, sign)};
       lever_a.x = fma(half, along_x, lever_a.x), lever_a.z = fma(half, along_z, lever_a.z);

@@ -382,6 +382,7 @@ std::vector<Job> Store::claim(const std::string& worker, int count, double lease
                               bool suspects) {
   const Dialect& d = db_->dialect();
   constexpr const char* columns = "number, hash, model, inputs, attempt, vanished";
+  constexpr const char* losses = "vanished + CASE WHEN state = 'running' THEN 1 ELSE 0 END";  // with this one
   std::vector<Value> values = {worker, find_process(worker)};
   if (!model.empty()) values.emplace_back(model);
   Rows rows = transact(
@@ -393,20 +394,17 @@ std::vector<Job> Store::claim(const std::string& worker, int count, double lease
           if (!held.empty()) return held;
         }
         return db_->run(
-            fmt::format("WITH open AS MATERIALIZED (SELECT number, vanished + CASE WHEN state = 'running' THEN 1 ELSE "
-                        "0 END AS losses FROM job WHERE state IN ('waiting', 'running') AND (state = 'waiting' OR "
-                        "(lease_until < {0} AND vanished + 1 < {1} AND {6})) {5} {8} ORDER BY number LIMIT {2} {3}), "
-                        "first AS (SELECT number, losses FROM open ORDER BY number LIMIT 1), chosen AS (SELECT number "
-                        "FROM open WHERE number = (SELECT number FROM first) OR (losses < {9} AND (SELECT losses FROM "
-                        "first) < {9})) UPDATE job SET vanished = vanished + CASE WHEN state = 'running' THEN 1 ELSE 0 "
-                        "END, state = 'running', attempt = attempt + 1, worker = $1, lease_until = {0} + {4} WHERE "
-                        "number IN (SELECT number FROM chosen) RETURNING {7}",
+            fmt::format("WITH open AS MATERIALIZED (SELECT number, {10} AS losses FROM job WHERE state IN ('waiting', "
+                        "'running') AND (state = 'waiting' OR (lease_until < {0} AND vanished + 1 < {1} AND {6})) {5} "
+                        "{8} ORDER BY number LIMIT {2} {3}), first AS (SELECT number, losses FROM open ORDER BY number "
+                        "LIMIT 1), chosen AS (SELECT number FROM open WHERE number = (SELECT number FROM first) OR "
+                        "(losses < {9} AND (SELECT losses FROM first) < {9})) UPDATE job SET vanished = {10}, state = "
+                        "'running', attempt = attempt + 1, worker = $1, lease_until = {0} + {4} WHERE number IN "
+                        "(SELECT number FROM chosen) RETURNING {7}",
                         d.now, most_vanished, count, d.skip_locked, lease, model.empty() ? "" : "AND model = $3",
                         is_of_others("$2"), columns,
-                        suspects ? std::string()
-                                 : fmt::format("AND vanished + CASE WHEN state = 'running' THEN 1 ELSE 0 END < {}",
-                                               suspect_vanished),
-                        suspect_vanished),
+                        suspects ? std::string() : fmt::format("AND {} < {}", losses, suspect_vanished),
+                        suspect_vanished, losses),
             values);
       },
       true);

@@ -158,7 +158,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Not judged: the limits of its class need the site's attenuation law ([site.vibration]).", "Nicht beurteilt: Die Anhaltswerte seiner Klasse brauchen das Abklinggesetz des Standorts ([site.vibration])."],
   ["{*} Not judged: {} still moved at {:.1f} m/s when the run ended, and what has yet to come down may reach it.", "{} Nicht beurteilt: {} bewegte sich am Ende der Rechnung noch mit {} m/s, und was noch herunterkommt, kann daran reichen."],
   ["Limit of the plan: {:g} mm/s", "Grenzwert des Plans: {} mm/s"],
-  ["Limit at the foundation between {:g} Hz and {:g} Hz: {:.3g} to {:.3g} mm/s (DIN 4150-3:1999-02, Table 1, {})", "Anhaltswert am Fundament zwischen {} Hz und {} Hz: {} bis {} mm/s (DIN 4150-3:1999-02, Tabelle 1, {})"],
+  ["Limit at the foundation between {:g} Hz and {:g} Hz: {:.3g} to {:.3g} mm/s ({}; {})", "Anhaltswert am Fundament zwischen {} Hz und {} Hz: {} bis {} mm/s ({}; {})"],
   ["{} (line {}): {:g} mm/s up to 10 Hz, rising to {:g} at 50 Hz and {:g} at 100 Hz", "{} (Zeile {}): {} mm/s bis 10 Hz, steigend auf {} bei 50 Hz und {} bei 100 Hz"],
   ["DIN 4150-3:1999-02, Table 1", "DIN 4150-3:1999-02, Tabelle 1"],
   ["commercial and industrial buildings", "gewerblich genutzte Bauten und Industriebauten"],
