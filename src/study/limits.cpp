@@ -59,8 +59,7 @@ std::vector<int> list_open(const Problem& p, const StudyResult& r, const uncerta
                            const std::vector<std::string>& outputs) {
   std::vector<int> open;
   for (int k = 0; k < std::ssize(p.limits); ++k)
-    if (p.limits[static_cast<std::size_t>(k)].is_searched)
-      if (const auto c = read_limit(p, r, archive, outputs, k); c && !c->converged) open.push_back(k);
+    if (const auto c = read_limit(p, r, archive, outputs, k); c && !c->converged) open.push_back(k);
   return open;
 }
 
@@ -142,8 +141,7 @@ void read_limits(StudyResult& r, const Problem& p, const uncertainty::Archive& a
                  const std::vector<std::string>& outputs) {
   std::vector<Possibility> all;
   for (int k = 0; k < std::ssize(p.limits); ++k)
-    if (p.limits[static_cast<std::size_t>(k)].is_searched)
-      if (const auto c = read_limit(p, r, archive, outputs, k)) all.push_back(*c);
+    if (const auto c = read_limit(p, r, archive, outputs, k)) all.push_back(*c);
   r.limits = std::move(all);
 }
 

@@ -156,15 +156,7 @@ void list_direction_limit(const product::Plan& plan, const PlanMappingOptions& o
   if (!plan.criteria.azimuth) return;
   const double most = plan.criteria.azimuth_tolerance.value_or(usual);
   if (has_clearances(options))
-    p.limits.push_back({"azimuth_deviation",
-                        "",
-                        most,
-                        most,
-                        "of the plan",
-                        Limit::Kind::Direction,
-                        {},
-                        std::numeric_limits<double>::infinity(),
-                        false});
+    p.limits.push_back({"azimuth_deviation", "", most, most, "of the plan", Limit::Kind::Direction});
   else
     p.not_judged.emplace_back("azimuth");
 }

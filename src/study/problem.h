@@ -63,7 +63,6 @@ struct Limit {
   std::string left = {};
   /// Upper end of a screening's band from which the whole band lies above the limit.
   double above = std::numeric_limits<double>::infinity();
-  bool is_searched = true;  // else what breaks it is read off the runs
 };
 
 /// When runs of a plan end. One whose `output` says just that time, and whose outcome is not `unless`, ended before

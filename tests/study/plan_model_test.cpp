@@ -177,7 +177,6 @@ TEST(PlanModel, JudgesReachAndClearances) {
   EXPECT_EQ(p.limits[2].output, "azimuth_deviation");
   EXPECT_EQ(p.limits[2].kind, Limit::Kind::Direction);
   EXPECT_TRUE(p.limits[2].left.empty());
-  EXPECT_FALSE(p.limits[2].is_searched);
   EXPECT_THAT(p.not_judged, testing::IsEmpty());
   for (const Limit& limit : p.limits)
     for (const std::string& output : {limit.output, limit.left.empty() ? limit.output : limit.left})
