@@ -335,8 +335,9 @@ void System::resolve_contacts(double h, bool follows) {
     const auto push = [&] {
       kernel::sum_wrenches(job);
       kernel::update_touched(bodies);
-      if (!t.jointed_pairs.empty()) hold_changes(h);
+      if (!t.held.empty()) hold_changes(h);
     };
+    if (!t.held.empty()) foresee_joints(h);
     kernel::read_touched(bodies);
     kernel::press_contacts(job);
     push();
@@ -346,7 +347,6 @@ void System::resolve_contacts(double h, bool follows) {
     kernel::rub_contacts(job);
     push();
     kernel::book_contacts(job);
-    if (!t.held.empty()) keep_pushes();
 
     // forces do their work over the half steps before and after
     for (size_t slot = 0; slot < job.count; ++slot) {

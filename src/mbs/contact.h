@@ -170,11 +170,27 @@ struct PairLook {
   size_t slot = 0;  // two boxes: in the kernel's blocks
 };
 
-/// A body with joints that touches something, or did in the step before.
+/// A body with joints that touches something.
 struct JointedBody {
   int body = 0;
-  int place = -1;   // among the touched bodies
-  Vec3 push, turn;  // of contact on it in the last step [N, N·m]
+  int place = 0;            // among the touched bodies
+  int cluster = -1;         // into Touching::jointed_clusters; -1: its joints have ended
+  size_t first_answer = 0;  // into Touching::joint_answers: six times the cluster's rows, as JointedMobility has them
+  /// What joints add to its speeds in the step by other forces than those of contact, beyond what they answered in the
+  /// step before [m/s, rad/s].
+  Vec3 more_v, more_w;
+};
+
+/// A cluster one of whose bodies touches something.
+struct JointedCluster {
+  int rows = 0;
+  size_t first_meeting = 0, last_meeting = 0;  // into Touching::meetings
+};
+
+/// A joint of such a cluster at one of its bodies.
+struct JointMeeting {
+  int body = 0, first_row = 0, rows = 0;
+  size_t at = 0;  // into Touching::meeting_rows: of each unit force and torque on the body its rows of J M⁻¹
 };
 
 /// What joints take of the motion that forces on one body, or on another one of its cluster, would give it.
@@ -210,6 +226,9 @@ struct Touching {
   // of bodies that joints hold
   std::vector<JointedBody> held;
   std::vector<JointedPair> jointed_pairs;
+  std::vector<JointedCluster> jointed_clusters;
+  std::vector<JointMeeting> meetings;
+  std::vector<double> meeting_rows, joint_answers;
   std::vector<int> held_block;        // of each block, into held_fields; -1: none. Empty: nowhere any
   AlignedVector<double> held_fields;  // kernel::kHeldFields a block
 };
@@ -233,14 +252,15 @@ struct ContactScratch {
   AlignedVector<double> box_answers;
   PairSearch search;
   std::vector<JointedMobility> mobility;
-  std::vector<int> mobility_of, held_at;  // of each body, -1: none (B)
-  std::vector<unsigned char> is_read;     // clusters, in this look
+  std::vector<int> mobility_of;    // of each body, -1: none (B)
+  std::vector<int> read_clusters;  // of each cluster in this look, into Touching::jointed_clusters, -1: not yet
+  std::vector<Vec3> push_before, turn_before;  // all forces on jointed bodies in the step before (B)
+  std::vector<double> joint_rates;             // of a cluster's rows
   std::vector<int> first_of_cluster, next_of_cluster;
   DisjointSets units;                      // of touched bodies that move as one
   std::vector<int> island, count;          // of touched bodies
   std::vector<double> pulls, power, made;  // of dashpots: wrenches on the touched bodies, of each island their power
                                            // and force times the speed that they make
-  std::vector<JointedBody> held_before;
 };
 
 }  // namespace topple::mbs

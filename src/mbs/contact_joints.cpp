@@ -63,43 +63,71 @@ void System::begin_holding() {
   if (clusters_due && !joints.empty()) rebuild_clusters();
   contact.mobility.clear();
   contact.mobility_of.clear();
+  Touching& t = state.touching;
+  t.jointed_clusters.clear(), t.meetings.clear(), t.meeting_rows.clear();
+}
+
+/// Lays out how forces on a cluster's bodies move its joints apart; its place in Touching::jointed_clusters.
+int System::read_meetings(JointCluster& c) {
+  Touching& t = state.touching;
+  read_cluster(c, kDependent);
+  JointedCluster& to = t.jointed_clusters.emplace_back();
+  to.rows = c.matrix.rows();
+  to.first_meeting = t.meetings.size();
+  for (size_t k = 0; k < c.bodies.size(); ++k) {
+    const size_t b = static_cast<size_t>(c.bodies[k]);
+    const Mat3& W = world_inverse_inertia[b];
+    const double inverse_mass = state.body[b].inverse_mass;
+    for (int y = c.first_meeting[k]; y < c.first_meeting[k + 1]; ++y) {
+      const JointCluster::Meeting meeting = c.meetings[static_cast<size_t>(y)];
+      const int rows = joints[static_cast<size_t>(c.joints[static_cast<size_t>(meeting.place)])].rows;
+      const JointMeeting m{c.bodies[k], c.matrix.first_row(meeting.place), rows, t.meeting_rows.size()};
+      t.meetings.push_back(m);
+      t.meeting_rows.resize(m.at + 6 * static_cast<size_t>(rows));
+      for (int r = 0; r < rows; ++r) {
+        const JointRow& row = joint_rows[static_cast<size_t>(m.first_row + r)];
+        const Vec3 line = (meeting.is_child ? inverse_mass : -inverse_mass) * row.line;
+        const Vec3 turn = W * (meeting.is_child ? row.turn_child : row.turn_parent);
+        double* at = &t.meeting_rows[m.at + static_cast<size_t>(r)];
+        for (int i = 0; i < 3; ++i) {
+          at[static_cast<size_t>(i * rows)] = line[i];
+          at[static_cast<size_t>((3 + i) * rows)] = turn[i];
+        }
+      }
+    }
+  }
+  to.last_meeting = t.meetings.size();
+  return static_cast<int>(t.jointed_clusters.size()) - 1;
 }
 
 int System::find_mobility(size_t b) {
   if (b >= B || !jointed[b] || !in_cluster[b]) return -1;
   if (contact.mobility_of.empty()) {
     contact.mobility_of.assign(B, -1);
-    contact.is_read.assign(clusters.size(), 0);
+    contact.read_clusters.assign(clusters.size(), -1);
   }
   int& at = contact.mobility_of[b];
   if (at >= 0) return at;
   at = static_cast<int>(contact.mobility.size());
   JointedMobility& m = contact.mobility.emplace_back();
-  m.body = static_cast<int>(b), m.cluster = cluster_of[b];
-  JointCluster& c = clusters[static_cast<size_t>(m.cluster)];
-  unsigned char& is_read = contact.is_read[static_cast<size_t>(m.cluster)];
-  if (!is_read) read_cluster(c, kDependent);
-  is_read = 1;
+  const size_t cluster = static_cast<size_t>(cluster_of[b]);
+  JointCluster& c = clusters[cluster];
+  int& read = contact.read_clusters[cluster];
+  if (read < 0) read = read_meetings(c);
+  m.body = static_cast<int>(b), m.cluster = read;
   const size_t n = static_cast<size_t>(c.matrix.rows());
-  const Mat3 W = calc_world_inverse_inertia(b);
+  const Mat3& W = world_inverse_inertia[b];
   const double inverse_mass = state.body[b].inverse_mass;
   m.rows.assign(6 * n, 0);
-  const size_t k = static_cast<size_t>(std::find(c.bodies.begin(), c.bodies.end(), m.body) - c.bodies.begin());
-  for (int y = c.first_meeting[k]; y < c.first_meeting[k + 1]; ++y) {
-    const JointCluster::Meeting meeting = c.meetings[static_cast<size_t>(y)];
-    const CompiledJoint& j = joints[static_cast<size_t>(c.joints[static_cast<size_t>(meeting.place)])];
-    JointRow rows[6];
-    calc_joint_rows(j, calc_joint_frames(state, j), rows);
-    for (int r = 0; r < j.rows; ++r) {
-      const double length = r < j.lines ? 1 : c.length;
-      const Vec3 line = (meeting.is_child ? inverse_mass : -inverse_mass) * rows[r].line;
-      const Vec3 turn = W * (length * (meeting.is_child ? rows[r].turn_child : rows[r].turn_parent));
-      const size_t row = static_cast<size_t>(c.matrix.first_row(meeting.place) + r);
-      for (size_t i = 0; i < 3; ++i) {
-        m.rows[i * n + row] += line[static_cast<int>(i)];
-        m.rows[(3 + i) * n + row] += turn[static_cast<int>(i)];
-      }
-    }
+  const Touching& t = state.touching;
+  const JointedCluster& of = t.jointed_clusters[static_cast<size_t>(read)];
+  for (size_t y = of.first_meeting; y < of.last_meeting; ++y) {
+    const JointMeeting& meeting = t.meetings[y];
+    if (meeting.body != m.body) continue;
+    const size_t rows = static_cast<size_t>(meeting.rows);
+    for (size_t i = 0; i < 6; ++i)
+      for (size_t r = 0; r < rows; ++r)
+        m.rows[i * n + static_cast<size_t>(meeting.first_row) + r] += t.meeting_rows[meeting.at + i * rows + r];
   }
   m.answers = m.rows;
   for (size_t i = 0; i < 6; ++i) {
@@ -189,40 +217,30 @@ void System::keep_mobility(const ContactGroup& fitted) {
 
 void System::hold_contacts() {
   Touching& t = state.touching;
-  contact.held_before.swap(t.held);
   t.held.clear();
   t.jointed_pairs.clear();
   t.held_block.clear();
-  std::vector<int>& at = contact.held_at;
-  if (at.size() != B) at.assign(B, -1);
-  for (size_t i = 1; i < t.body.size(); ++i) {
-    const size_t b = static_cast<size_t>(t.body[i]);
-    if (!jointed[b]) continue;
-    at[b] = static_cast<int>(t.held.size());
-    t.held.push_back({t.body[i], static_cast<int>(i), {}, {}});
-  }
-  for (const JointedBody& before : contact.held_before) {
-    if (before.place < 0) continue;
-    int& now = at[static_cast<size_t>(before.body)];
-    if (now < 0) {
-      now = static_cast<int>(t.held.size());
-      t.held.push_back({before.body, -1, {}, {}});
+  t.joint_answers.clear();
+  for (size_t i = 1; i < t.body.size(); ++i)
+    if (jointed[static_cast<size_t>(t.body[i])]) {
+      JointedBody& h = t.held.emplace_back();
+      h.body = t.body[i], h.place = static_cast<int>(i);
     }
-    JointedBody& h = t.held[static_cast<size_t>(now)];
-    h.push = before.push, h.turn = before.turn;
-  }
-  for (const JointedBody& h : t.held) at[static_cast<size_t>(h.body)] = -1;
   if (t.held.empty()) return;
 
   // pairs of those in one cluster
-  contact.first_of_cluster.assign(clusters.size(), -1);
+  contact.first_of_cluster.assign(t.jointed_clusters.size(), -1);
   contact.next_of_cluster.assign(t.held.size(), -1);
   std::vector<int> mobility(t.held.size());
   for (size_t i = t.held.size(); i-- > 0;) {
-    mobility[i] = find_mobility(static_cast<size_t>(t.held[i].body));
+    JointedBody& h = t.held[i];
+    mobility[i] = find_mobility(static_cast<size_t>(h.body));
     if (mobility[i] < 0) continue;
-    int& first =
-        contact.first_of_cluster[static_cast<size_t>(contact.mobility[static_cast<size_t>(mobility[i])].cluster)];
+    const JointedMobility& m = contact.mobility[static_cast<size_t>(mobility[i])];
+    h.cluster = m.cluster;
+    h.first_answer = t.joint_answers.size();
+    t.joint_answers.insert(t.joint_answers.end(), m.answers.begin(), m.answers.end());
+    int& first = contact.first_of_cluster[static_cast<size_t>(m.cluster)];
     contact.next_of_cluster[i] = first;
     first = static_cast<int>(i);
   }
@@ -272,7 +290,7 @@ void System::fill_held_blocks() {
   // the groups of bodies that feel each other share their mass
   const auto place_of = [&](int held) { return t.held[static_cast<size_t>(held)].place; };
   for (const JointedPair& p : t.jointed_pairs)
-    if (p.to != p.from && place_of(p.to) >= 0 && place_of(p.from) >= 0)
+    if (p.to != p.from)
       t.share[static_cast<size_t>(place_of(p.to))] +=
           p.coupling * contact.groups[static_cast<size_t>(place_of(p.from))];
   const size_t W = kernel::lanes();
@@ -303,34 +321,67 @@ void System::fill_held_blocks() {
   for (const ContactGroup& g : t.group) write(g, g.a, 0), write(g, g.b, 1);
 }
 
-void System::hold_changes(double h) {
-  // joints' forces are those of the step before, with what they then answered to contact
-  const Touching& t = state.touching;
-  for (const JointedPair& p : t.jointed_pairs) {
-    const int place = t.held[static_cast<size_t>(p.to)].place;
-    if (place < 0) continue;
-    const JointedBody& from = t.held[static_cast<size_t>(p.from)];
-    double more[6] = {from.push.x, from.push.y, from.push.z, from.turn.x, from.turn.y, from.turn.z};
-    if (from.place >= 0) {
-      const double* sum = contact.sums.data() + static_cast<size_t>(from.place) * kernel::kWrenchRow;
-      for (int i = 0; i < 6; ++i) more[i] -= sum[i];
+void System::keep_pushes() {
+  if (!model.contact.ground && !model.contact.bodies) return;
+  contact.push_before.resize(B), contact.turn_before.resize(B);
+  for (const JointCluster& c : clusters)
+    for (const int body : c.bodies) {
+      const size_t b = static_cast<size_t>(body);
+      contact.push_before[b] = force[b], contact.turn_before[b] = torque[b];
     }
-    double* change = contact.changes.data() + static_cast<size_t>(place) * kernel::kWrenchRow;
-    for (int i = 0; i < 6; ++i) {
-      double less = 0;
-      for (int j = 0; j < 6; ++j) less += p.less[6 * i + j] * more[j];
-      change[i] += h * less;
+}
+
+void System::foresee_joints(double h) {
+  Touching& t = state.touching;
+  std::vector<double>& rates = contact.joint_rates;
+  int of = -1;  // whose rates these are
+  for (JointedBody& held : t.held) {
+    held.more_v = held.more_w = {};
+    if (held.cluster < 0) continue;
+    const JointedCluster& c = t.jointed_clusters[static_cast<size_t>(held.cluster)];
+    const size_t n = static_cast<size_t>(c.rows);
+    if (held.cluster != of) {
+      of = held.cluster;
+      rates.assign(n, 0);
+      for (size_t y = c.first_meeting; y < c.last_meeting; ++y) {
+        const JointMeeting& m = t.meetings[y];
+        const size_t b = static_cast<size_t>(m.body), rows = static_cast<size_t>(m.rows);
+        const Vec3 push = contact.push_before[b] - Vec3(force[b]), turn = contact.turn_before[b] - Vec3(torque[b]);
+        double less[6] = {push.x, push.y, push.z, turn.x, turn.y, turn.z};
+        if (model.is_planar) less[1] = less[3] = less[5] = 0;
+        for (size_t i = 0; i < 6; ++i)
+          for (size_t r = 0; r < rows; ++r)
+            rates[static_cast<size_t>(m.first_row) + r] += less[i] * t.meeting_rows[m.at + i * rows + r];
+      }
     }
+    const double* answers = &t.joint_answers[held.first_answer];
+    const auto sum = [&](size_t i) {
+      double all = 0;
+      for (size_t r = 0; r < n; ++r) all += answers[i * n + r] * rates[r];
+      return h * all;
+    };
+    held.more_v = {sum(0), sum(1), sum(2)};
+    held.more_w = {sum(3), sum(4), sum(5)};
   }
 }
 
-void System::keep_pushes() {
-  for (JointedBody& h : state.touching.held) {
-    h.push = h.turn = {};
-    if (h.place < 0) continue;
-    const double* sum = contact.sums.data() + static_cast<size_t>(h.place) * kernel::kWrenchRow;
-    h.push = {sum[0], sum[1], sum[2]};
-    h.turn = {sum[3], sum[4], sum[5]};
+void System::hold_changes(double h) {
+  // joints' forces are those of the step before
+  const Touching& t = state.touching;
+  for (const JointedBody& held : t.held) {
+    double* change = contact.changes.data() + static_cast<size_t>(held.place) * kernel::kWrenchRow;
+    for (int i = 0; i < 3; ++i) change[i] += held.more_v[i], change[3 + i] += held.more_w[i];
+  }
+  for (const JointedPair& p : t.jointed_pairs) {
+    const size_t to = static_cast<size_t>(t.held[static_cast<size_t>(p.to)].place),
+                 from = static_cast<size_t>(t.held[static_cast<size_t>(p.from)].place);
+    const double* sum = contact.sums.data() + from * kernel::kWrenchRow;
+    double* change = contact.changes.data() + to * kernel::kWrenchRow;
+    for (int i = 0; i < 6; ++i) {
+      double less = 0;
+      for (int j = 0; j < 6; ++j) less += p.less[6 * i + j] * sum[j];
+      change[i] -= h * less;
+    }
   }
 }
 

@@ -27,7 +27,7 @@ void System::find_together() {
   const auto each_coupling = [&](auto&& f) {
     for (const JointedPair& p : t.jointed_pairs) {
       const int to = t.held[static_cast<size_t>(p.to)].place, from = t.held[static_cast<size_t>(p.from)].place;
-      if (to >= 0 && from >= 0 && to != from) f(to, from, p.coupling);
+      if (to != from) f(to, from, p.coupling);
     }
   };
   each_coupling([&](int to, int from, double coupling) {
@@ -114,8 +114,7 @@ void System::match_dashpots() {
   }
   for (const JointedPair& p : t.jointed_pairs) {
     const int to = t.held[static_cast<size_t>(p.to)].place, from = t.held[static_cast<size_t>(p.from)].place;
-    if (to < 0 || from < 0 || island[static_cast<size_t>(to)] < 0 ||
-        island[static_cast<size_t>(to)] != island[static_cast<size_t>(from)])
+    if (island[static_cast<size_t>(to)] < 0 || island[static_cast<size_t>(to)] != island[static_cast<size_t>(from)])
       continue;
     double& less = made[static_cast<size_t>(island[static_cast<size_t>(to)])];
     for (size_t x = 0; x < 6; ++x)

@@ -48,7 +48,9 @@ void visit(Archive& ar, S& s, C& sys) {
       ar(s.touched_pairs);
   ar(s.touching.steps), ar(s.touching.body), ar(s.touching.group), ar(s.touching.rows), ar(s.touching.a),
       ar(s.touching.b), ar(s.touching.groups), ar(s.touching.points), ar(s.touching.share), ar(s.touching.together),
-      ar(s.touching.held), ar(s.touching.jointed_pairs), ar(s.touching.held_block), ar(s.touching.held_fields);
+      ar(s.touching.held), ar(s.touching.jointed_pairs), ar(s.touching.held_block), ar(s.touching.held_fields),
+      ar(s.touching.jointed_clusters), ar(s.touching.meetings), ar(s.touching.meeting_rows),
+      ar(s.touching.joint_answers);
   ar(s.removed), ar(s.contact_energy), ar(s.stick_energy), ar(s.contact_loss), ar(s.contact_loss_power),
       ar(s.friction_work), ar(s.friction_power), ar(s.total_at_start), ar(s.stored_at_start);
   ar(s.gravity_at_start), ar(s.largest_residual), ar(s.released), ar(s.largest_drift), ar(s.quiet_steps);

@@ -523,6 +523,7 @@ class System {
   void match_dashpots();
   // contact_joints.cpp
   void begin_holding();
+  int read_meetings(JointCluster&);
   /// What joints leave of a body's mobility, into ContactScratch::mobility; -1: none hold it.
   int find_mobility(size_t body);
   /// Speed along an axis of a point of a body per force there; the lever is from the centre of mass [1/kg].
@@ -535,9 +536,12 @@ class System {
   /// Couples touched bodies that joints hold, once all groups are known.
   void hold_contacts();
   void fill_held_blocks();
-  /// Takes from the speeds that forces of contact change what joints take.
-  void hold_changes(double h);
+  /// Keeps the forces of the step that ends, which the joints have answered.
   void keep_pushes();
+  /// What joints answer to the forces known so far beyond their answer in the step before.
+  void foresee_joints(double h);
+  /// Adds that to the speeds, and takes from what forces of contact change what joints take.
+  void hold_changes(double h);
   /// Gives every group found a slot of the kernel.
   void fill_contact_blocks();
   /// Steps from one look for touching points to the next.

@@ -513,7 +513,7 @@ TEST(Run, WhatMayStillBeBrokenWhenTheTimeIsOverIsNotJudged) {
         << id;
   }
   EXPECT_EQ(finding(at_once, "clearance.far").status, record::Status::Good);
-  const record::Record late = run_for("20 s");
+  const record::Record late = run_for("40 s");
   EXPECT_EQ(late.ending, "at_rest");
   for (const record::Finding& f : late.findings) EXPECT_FALSE(is_not_judged(f)) << f.id;
 }
