@@ -202,6 +202,39 @@ HWY_INLINE Num<D> calc_mobility(const double* HWY_RESTRICT g, const double* held
   return fma(load<D>(g, kGroupsA), of_a, load<D>(g, kGroupsB) * of_b);
 }
 
+/// Forces of a group's dashpots along several directions, before their limits.
+///   time, at  within the step, whose speed they see [s], [1]
+template <class D>
+HWY_NOINLINE hn::Mask<D> damp_group(const ContactJob& job, size_t block, const Motion<D>& change, Num<D> time,
+                                    Num<D> at, Num<D>* force) {
+  const size_t W = hn::Lanes(D());
+  const double *g = job.groups + block * kGroupFields * W, *held = held_of(job, block, W);
+  const V3<D> n = load3<D>(g, kNormal), apart = load3<D>(g, kApart);
+  const size_t first = job.rows[block], count = job.rows[block + 1] - first;
+  V3<D> lever[kMostDamped];
+  Num<D> rate[kMostDamped], speed[kMostDamped];
+  for (size_t i = 0; i < count; ++i) {
+    const double* p = job.points + (first + i) * kPointFields * W;
+    lever[i] = cross(load3<D>(p, kPlace), n), rate[i] = load<D>(p, kRate);
+    speed[i] = fma(at, dot(n, change.v) + dot(lever[i], change.w), load<D>(p, kApproach));
+  }
+  const auto slow = [&](Num<D> against, const V3<D>& torque) {
+    const V3<D> push = against * n, torque_b = torque - cross(apart, push);  // on b, and against what acts on a
+    V3<D> va = load<D>(g, kMassA) * push, wa = num<D>(-1) * times<D>(g, kInertiaA, torque);
+    V3<D> vb = load<D>(g, kMassB) * push, wb = num<D>(-1) * times<D>(g, kInertiaB, torque_b);
+    if (held != nullptr) {
+      const Motion<D> a = calc_less<D>(held, push, num<D>(-1) * torque),
+                      b = calc_less<D>(held + kHeldBody * W, push, num<D>(-1) * torque_b);
+      va = va - a.v, wa = wa - a.w, vb = vb - b.v, wb = wb - b.w;
+    }
+    const Num<D> a = load<D>(g, kGroupsA), b = load<D>(g, kGroupsB);
+    const V3<D> spin_b = b * wb;
+    return Slowed<D>{dot(n, (a * va + b * vb) + cross(spin_b, apart)), a * wa + spin_b};
+  };
+  return damp_along_several<D>(
+      count, [&](size_t i) { return lever[i]; }, [&](size_t i) { return rate[i]; }, slow, time, speed, force);
+}
+
 template <class D>
 HWY_INLINE void press_block(const ContactJob& job, size_t block) {
   const D d;
@@ -356,13 +389,26 @@ HWY_INLINE void damp_block(const ContactJob& job, size_t block) {
                                  calc_mobility<D>(g, held_of(job, block, W), apart, (zero - sum) * n, torque));
   const Damper<D> damper(h, mobility, power);
   const Num<D> band = zero - load<D>(g, kBand), most = load<D>(g, kMost);
+  Num<D> several[kMostDamped];
+  const size_t points = last - first;
+  // of a body that shares its mass with no other group, on what is fixed, and no plain dashpots
+  const auto is_alone_on = [&](int groups, int mass) {
+    return hn::And(hn::Eq(load<D>(g, groups).v, hn::Set(d, 1)), hn::Eq(load<D>(g, mass).v, hn::Zero(d)));
+  };
+  const auto is_alone = hn::Or(is_alone_on(kGroupsA, kMassB), is_alone_on(kGroupsB, kMassA));
+  auto along_several =
+      hn::AndNot(hn::Or(hn::Ge(together.v, hn::Zero(d)), hn::Ge(load<D>(g, kDamping).v, hn::Zero(d))), is_alone);
+  const bool has_several = points > 1 && points <= kMostDamped && !hn::AllFalse(d, along_several);
+  if (has_several)
+    along_several = hn::And(along_several, damp_group<D>(job, block, change, h * damper.at, damper.at, several));
   Num<D> total = zero;
   sum = zero, torque = zeros<D>();
   for (size_t row = first; row < last; ++row) {
     double* p = point(row);
     const V3<D> la = cross(load3<D>(p, kPlace), n);
     const Num<D> v = fma(damper.at, along + dot(la, change.w), load<D>(p, kApproach)), full = load<D>(p, kFull);
-    const Num<D> free = damper.share * load<D>(p, kRate) * v;
+    Num<D> free = damper.share * load<D>(p, kRate) * v;
+    if (has_several) free = select(along_several, several[row - first], free);
     // the upper end may be infinite, where nothing is pressed too
     const Num<D> top = select(hn::Gt(full.v, hn::Zero(d)), most * full, zero);
     const Num<D> f = {hn::Min(hn::Max(free.v, (band * full).v), top.v)};

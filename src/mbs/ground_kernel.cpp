@@ -233,20 +233,35 @@ HWY_INLINE void press_ground_block(const GroundJob& job, size_t block) {
       torque = fma(zero - f, lever, torque);
     }
     const Damper<D> damper(h, mobility_of({(zero - sum) * n, torque}), power);
+    N free[kCorners];
+    V3<D> levers[kCorners];
+    for (int i = 0; i < count; ++i) levers[i] = cross(corner[i].place, n);
+    const auto speed_of = [&](int i) { return fma(damper.at, along + dot(levers[i], dw), corner[i].approach); };
+    for (int i = 0; i < count; ++i) free[i] = damper.share * corner[i].rate * speed_of(i);
+    if (count > 1) {
+      N speed[kCorners], force[kCorners];
+      for (int i = 0; i < count; ++i) speed[i] = speed_of(i);
+      const M along_several =
+          hn::AndNot(plain, damp_along_several<D>(
+                                static_cast<size_t>(count), [&](size_t i) { return levers[i]; },
+                                [&](size_t i) { return corner[i].rate; },
+                                [&](N against, const V3<D>& turning) {
+                                  return Slowed<D>{mass * against, num<D>(-1) * (inertia * turning)};
+                                },
+                                h * damper.at, speed, force));
+      for (int i = 0; i < count; ++i) free[i] = select(along_several, force[i], free[i]);
+    }
     const N band = zero - load<D>(constants, kGroundBand), most = load<D>(constants, kGroundMost);
     total = sum = zero;
     for (int i = 0; i < count; ++i) {
       Corner<D>& c = corner[i];
-      const V3<D> lever = cross(c.place, n);
-      const N speed = fma(damper.at, along + dot(lever, dw), c.approach);
-      const N free = damper.share * c.rate * speed;
       // the upper end may be infinite, where nothing is pressed too
       const N top = select(hn::Gt(c.full.v, zero.v), most * c.full, zero);
-      const N f = minimum(maximum(free, band * c.full), top);
+      const N f = minimum(maximum(free[i], band * c.full), top);
       c.normal = c.normal + f;
       total = total + c.normal;
       sum = sum + f;
-      damp.torque = fma(zero - f, lever, damp.torque);
+      damp.torque = fma(zero - f, levers[i], damp.torque);
     }
     damp.force = (zero - sum) * n;
   }
