@@ -324,7 +324,10 @@ void find_on_law(double low, const Over& over, const NextRow& next_row) {
   constexpr int most_cuts = 100;
   for (int cut = 0; cut < most_cuts && below < 0; ++cut) {
     const double way = cut % 4 == 3 ? 0.5 : above / (above - below), at = low + way * (high - low);
-    if (!(at > low && at < high)) return;
+    if (!(at > low && at < high)) {  // round-off: the nearer end
+      (void)over(above < -below ? low : high);
+      return;
+    }
     const double left = over(at);
     if (std::abs(left) <= kFound * at) return;
     if (left > 0)
@@ -443,10 +446,11 @@ struct Evaluation {
           shortening = std::max(0.0, (-force[0] - limit) / k[0]);
           return shortening - by;
         };
-        // the curve falls while the zone shortens: one more look at it after the first estimate
-        if (!p.is_at_rest)
-          (void)shorten_under(shortening);
-        else
+        // where the curve falls while the zone shortens, one more look at it after the first estimate; where it rises
+        // it may be steeper than the spring
+        const double begin = limit;
+        const bool is_found = !p.is_at_rest && (shorten_under(shortening), limit <= begin);
+        if (!is_found)
           find_on_law(0, shorten_under,
                       [&](double by) { return limits.next_shortening(z.shortened + by) - z.shortened; });
         z.axial -= shortening;
@@ -475,9 +479,9 @@ struct Evaluation {
           elongation = (force[0] - limit) / k[0];
           return elongation - by;
         };
-        if (!p.is_at_rest)
-          (void)elongate_under(elongation);
-        else
+        const double begin = limit;
+        const bool is_found = !p.is_at_rest && (elongate_under(elongation), limit <= begin);
+        if (!is_found)
           find_on_law(0, elongate_under,
                       [&](double by) { return limits.next_elongation(z.elongated + by) - z.elongated; });
         z.axial += elongation;

@@ -303,6 +303,22 @@ TEST(Kernel, FollowsTheFullLawWhileASectionIsCrushed) {
       }
 }
 
+// Six times as steep as the spring before its peak.
+TEST(Kernel, FollowsTheFullLawUpASteepCurve) {
+  for (const int stations : {1, 2})
+    for (std::uint32_t seed = 1; seed <= 3; ++seed) {
+      ZoneLaw zone = make_law(1);
+      zone.compression = {{0, 0.0002, 0.02, 0.1}, {2.9e6, 3.4e6, 0.34e6, 0.34e6}};
+      double full = 0;
+      const std::vector<Walked> law = compare(stations, zone, 5e-3, seed, 0.06, full);
+      EXPECT_GT(law.back().shortened, 0.03);
+      const auto rising = std::count_if(law.begin(), law.end(),
+                                        [](const Walked& w) { return w.shortened > 0 && w.shortened < 0.0002; });
+      EXPECT_GT(rising, 5) << stations << " " << seed;
+      EXPECT_LT(full, 0.05) << stations << " " << seed;
+    }
+}
+
 TEST(Kernel, FollowsTheFullLawWhileBarsBuckleAndAreLetGo) {
   ZoneLaw zone = make_law(1);
   zone.buckles = true;

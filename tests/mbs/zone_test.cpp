@@ -443,6 +443,29 @@ TEST(Zone, CrushesDownItsCurveAndBreaksAtItsLength) {
   EXPECT_EQ(w.z.reason, BreakReason::Crushing);
 }
 
+// A spring and a curve in series, however steep that is.
+TEST(Zone, FollowsCurvesThatRiseMoreSteeplyThanItsSpring) {
+  for (const double share : {0.2, 1.0, 4.0, 100.0})
+    for (const double sign : {1.0, -1.0}) {
+      const double slope = share * kStiff, most = 1e6;
+      ZoneLaw law;
+      (sign > 0 ? law.tension : law.compression) = {{0, most / slope, 1}, {0, most, most}};
+      Walk w(law);
+      const double whole = most * (1 / kStiff + 1 / slope);
+      for (const double part : {0.3, 0.9}) {
+        w.go(deform(sign * part * whole, 0, 0), 50);
+        EXPECT_NEAR(sign * w.z.resultant.c[0], part * most, 1e-9 * most) << share << " " << sign;
+        EXPECT_NEAR(sign > 0 ? w.z.elongated : w.z.shortened, part * most / slope, 1e-9 * whole);
+      }
+      // straight back, then on where it was
+      w.go(deform(sign * (0.9 * whole - 0.5 * most / kStiff), 0, 0), 50);
+      EXPECT_NEAR(sign * w.z.resultant.c[0], 0.4 * most, 1e-9 * most);
+      w.go(deform(sign * 1.5 * whole, 0, 0), 50);
+      EXPECT_NEAR(sign * w.z.resultant.c[0], most, 1e-9 * most);
+      EXPECT_NEAR(w.work, w.z.energy + w.z.plastic, 1e-3 * w.work);
+    }
+}
+
 TEST(Zone, RotationTakesCompressionCapacityAway) {
   // beyond 0.05 rad this family carries no moment under 1 MN and more: that is then all the zone can carry
   ZoneLaw law = make_law();
