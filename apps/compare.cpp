@@ -248,7 +248,7 @@ std::vector<Diagnostic> print_unsupported(const mbs::Model& model, const mbs::Op
     if (unsupported.empty()) continue;
     refusing.push_back(
         {Severity::Error,
-         "E801",
+         "E652",
          {},
          1,
          fmt::format("{} cannot express {}: {}", engine->name(), unsupported[0].place, unsupported[0].what),

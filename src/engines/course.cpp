@@ -295,7 +295,8 @@ bool Course::check_joints() {
         reason = "moment";
     }
     const bool turns = j.kind == mbs::Joint::Kind::Revolute || j.kind == mbs::Joint::Kind::Cylindrical;
-    if (!reason && turns && std::abs(angle_[i]) > j.rotation_limit) reason = "rotation";
+    // whose rotational element has broken turns freely
+    if (!reason && turns && std::abs(angle_[i]) > j.rotation_limit && !forces_.has_broken_hinge(i)) reason = "rotation";
     if (!reason) continue;
     release(i, reason);
     released = true;
@@ -321,6 +322,7 @@ void Course::release(size_t j, const char* reason) {
 
 bool Course::fire_events() {
   bool fired = false;
+  std::vector<size_t> due;  // all are decided on before the first acts
   const auto fire = [&](size_t i) {
     for (const mbs::Action& a : model_.events[i].actions) act(model_.events[i], a);
     say({mbs::Happening::Kind::EventFired, time_, static_cast<int>(i), -1, model_.events[i].name, 0});
@@ -329,26 +331,23 @@ bool Course::fire_events() {
   };
   const double late = step_ > 0 ? 1e-9 * step_ : 1e-12 * (1 + time_);
   for (; next_event_ < timed_.size() && model_.events[timed_[next_event_]].time <= time_ + late; ++next_event_)
-    fire(timed_[next_event_]);
-  if (!is_started_ || waiting_.empty()) return fired;
+    due.push_back(timed_[next_event_]);
   std::vector<size_t> still;
   for (const size_t i : waiting_) {
     const mbs::Event& e = model_.events[i];
-    const bool holds =
-        time_ + late >= e.time && std::any_of(e.triggers.begin(), e.triggers.end(), [&](const mbs::Trigger& t) {
-          // a joint that is gone has no angle and no displacement
-          const bool is_of_motion = t.quantity.kind == mbs::Quantity::Kind::JointAngle ||
-                                    t.quantity.kind == mbs::Quantity::Kind::JointDisplacement;
-          if (is_of_motion && joint_live_[static_cast<size_t>(t.quantity.index)] == 0) return false;
-          const double value = mbs::calc_component(t.quantity, t.component, calc_view());
-          return t.rising ? value >= t.limit : value <= t.limit;
-        });
-    if (holds)
-      fire(i);
-    else
-      still.push_back(i);
+    const bool holds = is_started_ && time_ + late >= e.time &&
+                       std::any_of(e.triggers.begin(), e.triggers.end(), [&](const mbs::Trigger& t) {
+                         // a joint that is gone has no angle and no displacement
+                         const bool is_of_motion = t.quantity.kind == mbs::Quantity::Kind::JointAngle ||
+                                                   t.quantity.kind == mbs::Quantity::Kind::JointDisplacement;
+                         if (is_of_motion && joint_live_[static_cast<size_t>(t.quantity.index)] == 0) return false;
+                         const double value = mbs::calc_component(t.quantity, t.component, calc_view());
+                         return t.rising ? value >= t.limit : value <= t.limit;
+                       });
+    (holds ? due : still).push_back(i);
   }
   waiting_ = still;
+  for (const size_t i : due) fire(i);
   return fired;
 }
 

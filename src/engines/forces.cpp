@@ -550,6 +550,12 @@ void Forces::switch_law(const mbs::Action& a, double time) {
   mbs::begin_switch(z.parameters, laws_, {a.law.index, time, a.ramp, a.stiffness_share}, z.state);
 }
 
+bool Forces::has_broken_hinge(size_t j) const {
+  for (size_t i = 0; i < rotational_.size(); ++i)
+    if (model_.rotational_elements[i].joint.index == static_cast<int>(j)) return !rotational_[i].state.live;
+  return false;
+}
+
 bool Forces::loosen_joint(size_t j) {
   for (size_t i = 0; i < rotational_.size(); ++i) {
     const mbs::RotationalElement& r = model_.rotational_elements[i];

@@ -59,6 +59,8 @@ class Forces {
   // Events; they count from the next evaluation on.
   void remove_element(size_t);
   void switch_law(const mbs::Action&, double time);
+  /// Whether the joint's rotational element holds no longer; false if it has none.
+  bool has_broken_hinge(size_t joint) const;
   /// Lets the joint's rotational element take over; false if it has none that holds.
   bool loosen_joint(size_t joint);
   /// Whether it has, and still holds.
