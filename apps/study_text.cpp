@@ -198,8 +198,13 @@ void print_boxes(std::FILE* out, const Problem& p, const StudyResult& r) {
   if (!r.insights.has_boxes) return;
   const uncertainty::DesignResult& d = r.insights.boxes;
   print_heading(out, "Permissible values");
-  print_line(out, fmt::format("asked: {}; kept by {:.1f} % of the support ({:.1f} % standard error, of {} spread runs)",
-                              p.permissible, 100 * d.fraction, 100 * d.fraction_error, d.spread));
+  if (d.spread > 0)
+    print_line(out,
+               fmt::format("asked: {}; kept by {:.1f} % of the support ({:.1f} % standard error, of {} spread runs)",
+                           p.permissible, 100 * d.fraction, 100 * d.fraction_error, d.spread));
+  else
+    print_line(out,
+               fmt::format("asked: {}; no spread run tells by which part of the support it is kept", p.permissible));
   if (d.boxes.empty()) print_line(out, "no box was found");
   int kept = 0;
   for (const uncertainty::PermissibleBox& b : d.boxes) {

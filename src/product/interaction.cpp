@@ -25,10 +25,16 @@ std::optional<Constraint> read_constraint(const Node& item, const std::string& l
   return Constraint{*left, *right, item.text[sign] == '>', item.place};
 }
 
+/// Whether what a formula uses has values; where one has none the run fails, which is no matter of the interaction.
+bool has_values(const Expression& e, std::span<const double> values) {
+  return std::ranges::none_of(e.used(), [&](int i) { return std::isnan(values[static_cast<size_t>(i)]); });
+}
+
 }  // namespace
 
 double calc_excess(const Interaction& interaction, size_t constraint, std::span<const double> values) {
   const Constraint& c = interaction.constraints[constraint];
+  if (!has_values(c.left, values) || !has_values(c.right, values)) return 0;
   const double left = c.left.evaluate(values), right = c.right.evaluate(values);
   const double g =
       (c.is_at_least ? right - left : left - right) - Interaction::slack * std::max(std::abs(left), std::abs(right));
@@ -36,7 +42,7 @@ double calc_excess(const Interaction& interaction, size_t constraint, std::span<
 }
 
 double calc_joint(const Interaction& interaction, std::span<const double> values) {
-  if (!interaction.joint) return 1;
+  if (!interaction.joint || !has_values(*interaction.joint, values)) return 1;
   const double mu = interaction.joint->evaluate(values);
   if (std::isnan(mu)) return 0;
   return mu >= 1 - Interaction::slack ? 1 : std::max(mu, 0.0);

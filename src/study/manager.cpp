@@ -172,6 +172,17 @@ bool has_open_knowing(const Insights& in) {
   });
 }
 
+bool has_open_bounds(const uncertainty::AlphaResult& alpha) {
+  const auto is_open = [](const std::vector<uncertainty::OutputBounds>& outputs) {
+    for (const auto& o : outputs)
+      for (const auto& l : o.levels)
+        if ((l.lower.sample >= 0 && !l.lower.converged) || (l.upper.sample >= 0 && !l.upper.converged)) return true;
+    return false;
+  };
+  return is_open(alpha.outputs) ||
+         std::ranges::any_of(alpha.classes, [&](const auto& c) { return is_open(c.outputs); });
+}
+
 bool is_any_open(const std::vector<uncertainty::Possibility>& found) {
   return std::any_of(found.begin(), found.end(), [](const auto& c) { return !c.converged; });
 }
@@ -466,14 +477,19 @@ class Manager {
     }
   }
 
-  static uncertainty::Ending find_ending(const StudyResult& r, const uncertainty::Asker& asker) {
+  uncertainty::Ending find_ending(const StudyResult& r, const uncertainty::Asker& asker) const {
     using uncertainty::Ending;
     if (asker.is_cancelled()) return Ending::Cancelled;
-    const bool is_open = r.alpha.ending != Ending::Complete || has_open_knowing(r.insights) ||
-                         is_any_open(r.possibilities.classes) || is_any_open(r.requirement) || is_any_open(r.limits);
+    // searches leave what is less than a look to both sides of each input
+    const bool is_used_up = asker.rest() <= 2 * std::ssize(problem_.inputs);
+    // a search that had a part of the runs may have ended with them and left nothing open
+    const bool is_alpha_open = r.alpha.ending == Ending::LimitReached ? is_used_up || has_open_bounds(r.alpha)
+                                                                      : r.alpha.ending != Ending::Complete;
+    const bool is_open = is_alpha_open || has_open_knowing(r.insights) || is_any_open(r.possibilities.classes) ||
+                         is_any_open(r.requirement) || is_any_open(r.limits);
     if (!is_open) return Ending::Complete;
     // a search of bounds keeps a few runs for its last steps
-    const bool is_cut = asker.rest() == 0 || r.alpha.ending == Ending::LimitReached;
+    const bool is_cut = is_used_up || r.alpha.ending == Ending::LimitReached;
     return is_cut ? Ending::LimitReached : Ending::NotConverged;
   }
 

@@ -127,8 +127,8 @@ json insights_json(const Problem& p, const StudyResult& r) {
   const uncertainty::DesignResult& d = in.boxes;
   json& boxes = out["boxes"];
   boxes = {{"requirement", p.permissible},
-           {"permissible_part", d.fraction},
-           {"permissible_part_error", d.fraction_error},
+           {"permissible_part", d.spread > 0 ? json(d.fraction) : json()},
+           {"permissible_part_error", d.spread > 0 ? json(d.fraction_error) : json()},
            {"permissible_part_points", d.spread},
            {"permissible_runs", d.permissible},
            {"forbidden_runs", d.forbidden},

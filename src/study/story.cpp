@@ -50,6 +50,8 @@ Marks count_marks(const Problem& p, const StudyResult& r) {
   for (const auto& k : r.insights.knowing)
     for (const auto& c : k.classes)
       if (c.possibility > 0) add(c.converged);
+  for (const auto& b : r.insights.boxes.boxes)
+    if (b.kept) add_bounds(b.outputs);
   return m;
 }
 
@@ -603,7 +605,7 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
   }
   const auto add_limit = [&] {
     const Marks marks = count_marks(p, r);
-    const int left = p.limit - static_cast<int>(runs);
+    const int left = make_alpha_options(p).limit - static_cast<int>(runs);
     if (left > 0 && marks.open > 0)
       add("limit",
           fmt::format("Of the runs that were allowed {} are left, too few for what was still to be searched: {} of {} "

@@ -257,6 +257,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["reaction", "Auflagerkraft"],
   ["The floor load above storey {} is left out: there is no slab to carry it.", "Die Deckenlast über Geschoss {} bleibt weg: Keine Decke trägt sie."],
   ["The mouth of {} at {:.1f} m leaves {:.0f} deg of the ring. The weight of {:.2f} MN above it turns with {:.2f} MNm towards {:.0f} deg about the centroid of what is left, {:.2f} m off the axis, which resists with {:.2f} MNm at most: it {}.", "Das Sprengmaul von {} bei {} m lässt {} deg des Rings stehen. Das Gewicht von {} MN darüber dreht mit {} MNm nach {} deg um den Schwerpunkt des Rests, {} m neben der Achse; der Rest widersteht höchstens mit {} MNm: {}."],
+  ["Cables are not counted in that.", "Seile sind darin nicht gezählt."],
   ["turns over", "Er kippt"],
   ["does not turn over by its weight alone, but a rigid block that is let go at once on such a hinge does", "Er kippt nicht allein durch sein Gewicht, aber ein starrer Block, der auf einmal auf einem solchen Gelenk losgelassen wird, kippt"],
   ["does not turn over, nor does a rigid block that is let go at once on such a hinge", "Er kippt nicht, und auch kein starrer Block, der auf einmal auf einem solchen Gelenk losgelassen wird"],

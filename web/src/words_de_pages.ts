@@ -523,6 +523,7 @@ export const germanOfPages: readonly (readonly [string, string])[] = [
   ["upper", "obere"],
   ["Table of drivers", "Tabelle der Einflüsse"],
   ["Asked:", "Verlangt:"],
+  [". No spread run tells on which part of the support it holds.", ". Auf welchem Teil des Trägers es gilt, sagt keine verteilte Rechnung."],
   [". It holds on {:g} % of the support (± {:g} %, of {:d} spread runs).", ". Das gilt auf {} % des Trägers (± {} %, aus {} verteilten Rechnungen)."],
   ["Box {:d}: {:g} % of the support", "Quader {}: {} % des Trägers"],
   ["Dropped box: {:g} % of the support", "Verworfener Quader: {} % des Trägers"],

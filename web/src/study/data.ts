@@ -129,7 +129,7 @@ export interface Study {
     outcomes: { name: string; share: number; inputs: Driver[] }[];
   };
   known: { input: string; outcomes: { name: string; possibility: number; converged?: boolean }[] }[]; // not known of old studies
-  boxes: { requirement: string; permissible_part: number; permissible_part_error: number; permissible_part_points: number; list: Box[] } | null;
+  boxes: { requirement: string; permissible_part: number | null; permissible_part_error: number | null; permissible_part_points: number; list: Box[] } | null;
   confirmation?: Confirmation; // of a condensed study
   curves: Curve[];
   fans: Fan[];

@@ -96,7 +96,9 @@ export function Boxes(props: { state: State }) {
       <h2>Permissible values</h2>
       <p>
         Asked: <strong>{boxes.requirement}</strong>
-        {`. It holds on ${formatNumber(100 * boxes.permissible_part, 3)} % of the support (± ${formatNumber(100 * boxes.permissible_part_error, 2)} %, of ${boxes.permissible_part_points} spread runs).`}
+        {boxes.permissible_part === null || boxes.permissible_part_error === null
+          ? ". No spread run tells on which part of the support it holds."
+          : `. It holds on ${formatNumber(100 * boxes.permissible_part, 3)} % of the support (± ${formatNumber(100 * boxes.permissible_part_error, 2)} %, of ${boxes.permissible_part_points} spread runs).`}
       </p>
       {boxes.list.length === 0 && <p class="quiet">No box of inputs was found that keeps it.</p>}
       {boxes.list.map((box, n) => (
