@@ -11,6 +11,7 @@
 #include "nearfield/family.h"
 #include "nearfield/moment_curve.h"
 #include "nearfield/rcc.h"
+#include "rcc_report.h"
 #include "uncertainty/alpha.h"
 #include "uncertainty/fan.h"
 #include "uncertainty/possibility.h"
@@ -251,10 +252,10 @@ std::optional<record::RccFuzzyReport> make_fuzzy_report(const product::SectionFi
       out.trajectory = march.moment;
       out.values.push_back(*std::max_element(march.moment.begin(), march.moment.end()));
       for (const size_t j : searched) out.values.push_back(march.moment[j]);
-      out.outcome = march.last < 0                                       ? NotCarried
-                    : static_cast<size_t>(march.last) + 1 < kappa.size() ? LosesForce
-                    : march.moment.back() <= 0                           ? LosesMoment
-                                                                         : Carries;
+      out.outcome = march.last < 0                                               ? NotCarried
+                    : static_cast<size_t>(march.last) + 1 < kappa.size()         ? LosesForce
+                    : !(march.moment.back() > kNothingLeft * out.values.front()) ? LosesMoment
+                                                                                 : Carries;
       return out;
     }),
                              progress, nullptr, options.limit);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/unit.h"
 #include "nearfield/biaxial.h"
@@ -46,7 +47,7 @@ std::string ending_of(const nearfield::MomentCurve& c, const nearfield::Rcc& rcc
   if (c.loses_force)
     return fmt::format("beyond {:.4g} rad the section can no longer carry the normal force", c.rotation.back());
   const double peak = *std::max_element(c.moment.begin(), c.moment.end());
-  if (c.moment.back() < 0.02 * peak) return fmt::format("nothing is left at {:.3g} rad", c.rotation.back());
+  if (c.moment.back() < kNothingLeft * peak) return fmt::format("nothing is left at {:.3g} rad", c.rotation.back());
   return fmt::format("computed up to {:.3g} rad", c.rotation.back());
 }
 
@@ -87,7 +88,15 @@ record::RccState make_state(const nearfield::ZoneInput& in, const nearfield::Fib
     out.eps_0 = c.torn.eps_0, out.curvature = c.torn.kappa, bars = c.bars[c.torn.after];
   else if (at.rotation < c.first_torn.rotation && c.rotation[j] > c.first_torn.rotation)
     out.eps_0 = c.eps_0[i];  // the chord leads to where a bar has torn
-  nearfield::find_equilibrium(fibres, c.N, out.curvature, out.eps_0, bars);
+  // the chord may lead to another branch than the curve's, as where the section cracks through
+  double best = std::numeric_limits<double>::infinity();
+  for (const double begin : {out.eps_0, c.eps_0[i], c.eps_0[j]}) {
+    double eps_0 = begin;
+    const bool is_found = nearfield::find_equilibrium(fibres, c.N, out.curvature, eps_0, bars);
+    const double M = c.direction * nearfield::calc_resultants(fibres, eps_0, out.curvature, bars).M;
+    const double off = is_found ? std::abs(M - at.moment) : std::numeric_limits<double>::max();
+    if (off < 0.9 * best) best = off, out.eps_0 = eps_0;
+  }
   const nearfield::SectionState state =
       nearfield::make_section_state(in, fibres, c.axis, out.eps_0, out.curvature, bars);
   for (const auto& l : state.layers)

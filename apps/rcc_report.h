@@ -9,6 +9,9 @@
 
 namespace topple::apps {
 
+/// Share of a curve's largest moment below which nothing is left.
+constexpr double kNothingLeft = 0.02;
+
 /// Normal forces when none are asked for: shares of the crushing force, rounded to two digits; tension positive [N].
 std::vector<double> choose_forces(const nearfield::Rcc&);
 

@@ -96,6 +96,7 @@ Fibres make_fibres(const ZoneInput& in, Axis axis) {
   out.core = material::make_concrete(material::confine(plain, {calc_tie_stress(in)}));
 
   const double kept = in.concrete_loss >= 1 ? 0 : left_over(in.cut_concrete);
+  out.kept = kept;
   const double cover_kept = in.cover_lost ? 0 : kept;
   constexpr int core_layers = 32, cover_layers = 4;
   const bool has_flange = axis == Axis::Y && in.flange.breadth > 0;
@@ -200,6 +201,7 @@ Fibres make_fibres(const ZoneInput& in, double angle) {
   const std::vector<Point> core = has_core ? corners(f.core_breadth, f.core_depth) : std::vector<Point>{};
   const double outer = extent(whole), inner = has_core ? extent(core) : outer;
   const double kept = in.concrete_loss >= 1 ? 0 : left_over(in.cut_concrete);
+  out.kept = kept;
   const double cover_kept = in.cover_lost ? 0 : kept;
   out.half_depth = outer;
   for (auto* v : {&out.at, &out.core_area, &out.cover_area}) v->clear();
@@ -249,7 +251,7 @@ double calc_cross_moment(const Fibres& f, double eps_0, double kappa, const BarS
   for (size_t i = 0; i < f.bar_at.size(); ++i) {
     const double eps = eps_0 + kappa * f.bar_at[i];
     double stress = calc_bar(f, bars, i, eps).stress;
-    if (displaces) stress -= material::calc_envelope(f.core, eps).stress;
+    if (displaces) stress -= f.kept * material::calc_envelope(f.core, eps).stress;
     M += f.bar_area[i] * f.bar_across[i] * stress;
   }
   return M;
@@ -283,7 +285,7 @@ Resultants calc_resultants(const Fibres& f, double eps_0, double kappa, const Ba
     double stress = s.stress, tangent = s.tangent;
     if (displaces) {  // the bar stands where the layers have counted concrete
       const material::Response a = material::calc_envelope(f.core, eps);
-      stress -= a.stress, tangent -= a.tangent;
+      stress -= f.kept * a.stress, tangent -= f.kept * a.tangent;
     }
     add(f.bar_at[i], f.bar_area[i] * stress, f.bar_area[i] * tangent);
   }

@@ -50,7 +50,7 @@ FibreGrid make_fibre_grid(const ZoneInput& in, int across) {
     const double area = (1 - in.cut_bars) * b.area;
     if (!(area > 0)) continue;
     out.bar.push_back({b.y, b.z, area, make_bar(in, b.diameter)});
-    if (displaces) out.cell.push_back({b.y, b.z, -area, true});
+    if (displaces) out.cell.push_back({b.y, b.z, -kept * area, true});
   }
   return out;
 }

@@ -60,10 +60,11 @@ void add_shear(const ZoneInput& in, Rcc& out) {
   out.shear_y = shear(b_core, s.tie_legs_y);
   out.shear_z = shear(h_core, s.tie_legs_z);
   out.shear_friction = kept > 0 ? (1 - 0.3) / (2 * 3.0) : 0;
-  // A section that is all bars still has their dowels.
+  // a section that is all bars still has their dowels, which bend over the zone or yield in shear
   double dowel = 0;
   for (const product::Bar& bar : s.bars)
-    dowel += (1 - in.cut_bars) * 2 * in.steel.fy * std::pow(bar.diameter, 3) / 6 / in.length;
+    dowel += (1 - in.cut_bars) * in.steel.fy *
+             std::min(2 * std::pow(bar.diameter, 3) / 6 / in.length, bar.area / std::sqrt(3.0));
   out.shear_y = std::max(out.shear_y, dowel);
   out.shear_z = std::max(out.shear_z, dowel);
 
@@ -136,7 +137,7 @@ Rcc make_rcc(const ZoneInput& in) {
 
   double area = 0;
   for (size_t i = 0; i < about_y.at.size(); ++i) area += about_y.core_area[i] + about_y.cover_area[i];
-  const double n = in.steel.Es - (area > 0 ? about_y.cover.Ec : 0);
+  const double n = in.steel.Es - (area > 0 ? about_y.kept * about_y.cover.Ec : 0);
   const auto calc_EI = [n, has_flange = in.flange.breadth > 0](const Fibres& f) {
     // about the centroid; that of a section with a flange is its concrete's
     double A = 0, S = 0, EI = 0;

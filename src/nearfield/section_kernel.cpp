@@ -246,7 +246,8 @@ PackedSection pack_section(const Fibres& f) {
   }
   // The bars stand where the layers have counted concrete.
   if (has_concrete(f))
-    for (size_t i = 0; i < f.bar_at.size(); ++i) core_at.push_back(f.bar_at[i]), core_area.push_back(-f.bar_area[i]);
+    for (size_t i = 0; i < f.bar_at.size(); ++i)
+      core_at.push_back(f.bar_at[i]), core_area.push_back(-f.kept * f.bar_area[i]);
   out.core_rows = add_rows(core_at, core_area, out.data);
   out.cover_rows = add_rows(cover_at, cover_area, out.data);
   out.steel_rows = (f.bar_at.size() + kRow - 1) / kRow;
