@@ -116,10 +116,15 @@ void tell_lost_checkpoint(ProgressLine& progress, const std::string& why) {
 }
 
 void tell_how_to_go_on(std::FILE* out, const Arguments& a, const std::string& verb, const std::string& options) {
+  std::string more = a.no_report ? " --no-report" : a.report ? " --report" : "";
+  more += write_option("--language", a.language == "en" ? "" : a.language);
+  if (a.threads > 1) more += fmt::format(" --threads {}", a.threads);
+  for (const auto& [is_asked, option] : {std::pair{a.verbose, " --verbose"}, std::pair{a.json, " --json"}})
+    if (is_asked) more += option;
   std::fprintf(out, "Go on with: topple %s %s%s%s%s%s%s -o %s --resume\n", verb.c_str(), quote_word(a.input).c_str(),
                options.c_str(), write_option("--knowledge", a.knowledge).c_str(),
                write_option(verb == "fe" ? "--until" : "--duration", a.duration).c_str(), a.csv ? " --csv" : "",
-               a.no_report ? " --no-report" : "", quote_word(a.output).c_str());
+               more.c_str(), quote_word(a.output).c_str());
 }
 
 std::string write_run_options(const Arguments& a) {

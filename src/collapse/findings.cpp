@@ -707,7 +707,8 @@ void add_rigid_block(const Context& c) {
     if (dot(g->p_top, across) > foremost - 0.5) row.push_back(g);
   RigidBlock block;
   block.gravity = norm(c.model.gravity);
-  block.release = stages.back().last;
+  block.release = 0;
+  for (const auto& stage : stages) block.release = std::max(block.release, stage.last);
   Vec3 pivot, centre;
   for (const GroundColumn* g : row) pivot += (1.0 / static_cast<double>(row.size())) * g->p_top;
   for (size_t b = 0; b < c.model.bodies.size(); ++b) {
@@ -777,8 +778,11 @@ void add_rigid_block(const Context& c) {
   bool rests = true;
   for (const BlockFrame& f : c.recorder.block_frames())
     rests &= f.time > block.release || norm(f.displacement) < c.k.stands_displacement;
-  if (stages.size() > 1)
-    rests &= !gains_speed(c, std::vector<bool>(c.map.structures.size(), true), stages[stages.size() - 2].last,
+  double before = -1;  // the last charge of a stage that is over before
+  for (const auto& stage : stages)
+    if (stage.last < block.release) before = std::max(before, stage.last);
+  if (before >= 0)
+    rests &= !gains_speed(c, std::vector<bool>(c.map.structures.size(), true), before,
                           find_frame(c.recorder.block_frames(), block.release));
   if (!rests) {
     c.add("rigid_block", "Mechanism", "Beside a rigid block",

@@ -83,6 +83,17 @@ const std::map<std::string, std::pair<double, double>>& ranges() {
   return list;
 }
 
+/// Unit of each rule, as the program's own set has it.
+const std::map<std::string, std::string>& units() {
+  static const std::map<std::string, std::string> list = [] {
+    std::map<std::string, std::string> all;
+    const nlohmann::json document = nlohmann::json::parse(kKnowledgeText);
+    for (const nlohmann::json& rule : document["rules"]) all[rule["id"]] = rule["unit"];
+    return all;
+  }();
+  return list;
+}
+
 }  // namespace
 
 Knowledge read_knowledge(const std::string& text, const std::string& name) {
@@ -133,6 +144,12 @@ Knowledge read_knowledge(const std::string& text, const std::string& name) {
       continue;
     }
     seen[rule.id] = true;
+    if (const std::string& unit = units().at(rule.id); rule.unit != unit) {
+      const std::string whole = at;
+      if (entry.contains("unit")) at += ".unit";
+      complain(fmt::format("rule \"{}\" has the unit \"{}\", not \"{}\"", rule.id, unit, rule.unit));
+      at = whole;
+    }
     const auto limits = ranges().find(rule.id);
     const auto [low, high] = limits == ranges().end() ? std::pair{0.0, mbs::kUnlimited} : limits->second;
     const bool may_be_zero = rule.id == "zone.elongation_share" || (low == 0 && high == 1);

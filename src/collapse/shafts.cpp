@@ -553,6 +553,8 @@ void Builder::note_mouth(const Member& m, const Shaft& s, const ShaftModel& shaf
     verdict = "turns over";
   else if (!comes_to_a_stop(tipping, moment, lever, stiffness, law.rupture_rotation))
     verdict = "does not turn over by its weight alone, but a rigid block that is let go at once on such a hinge does";
+  const bool is_pulled = std::ranges::any_of(
+      plan.cables, [&](const product::Cable& x) { return &member(x.member) == &m && x.position > joint.at; });
   double degrees = 0;
   for (const nearfield::RingSector& x : left.sectors) degrees += x.concrete > 0 ? x.angle() / unit::deg : 0;
   const double towards = std::abs(std::round(wrap(way + 1e-9) / unit::deg));
@@ -563,6 +565,7 @@ void Builder::note_mouth(const Member& m, const Shaft& s, const ShaftModel& shaf
                    "resists with {} MNm at most: it {}.",
                    m.name, joint.at, degrees, decimal_words(stays * 1e-6, 2), decimal_words(moment * 1e-6, 2), towards,
                    off, decimal_words(tipping.most() * 1e-6, 2), verdict)});
+  if (is_pulled) map.notes.back().text += " Cables are not counted in that.";
 }
 
 const product::Charge& Builder::charge_of(const ShaftElement& e) const {

@@ -112,8 +112,9 @@ std::string names_of(const std::vector<std::string>& names) {
   return text;
 }
 
-/// Slabs span along y. Where each of them does so the long way, the plan may be meant the other way round.
-void check_spans(const Plan& plan, const std::vector<Draft>& drafts, Complaints& complaints) {
+/// Slabs on beams along x span along y. Where all slabs are such and span the long way, the plan may be meant the other
+/// way round.
+void check_spans(const Plan& plan, const Carriers& carriers, const std::vector<Draft>& drafts, Complaints& complaints) {
   constexpr double kLongWay = 1.5;
   Gathering long_way;
   for (const Draft& draft : drafts) {
@@ -124,7 +125,10 @@ void check_spans(const Plan& plan, const std::vector<Draft>& drafts, Complaints&
     };
     const double along = gap(plan.frame_offsets, m.frame_a, m.frame_b),
                  across = gap(plan.row_offsets, m.row_a, m.row_b);
-    if (!(along > kLongWay * across)) return;
+    const auto lies_on = [&](int frame) {
+      return carriers.beams.count({m.storey, m.row_a, frame, m.row_b, frame}) > 0;
+    };
+    if (!(along > kLongWay * across) || !(lies_on(m.frame_a) || lies_on(m.frame_b))) return;
     std::ostringstream words;
     words << "spans along y, " << along << " m between beams along x, though its beams along y are " << across
           << " m apart";
@@ -215,7 +219,7 @@ void check_support(const Plan& plan, const std::vector<Draft>& drafts, Complaint
     complaints.warn("W502", group.place, names_of(group.names) + ": " + std::get<2>(key), group.help);
   for (const auto& [key, group] : idle.groups())
     complaints.warn("W511", group.place, names_of(group.names) + ": " + std::get<2>(key), group.help);
-  check_spans(plan, drafts, complaints);
+  check_spans(plan, carriers, drafts, complaints);
 }
 
 }  // namespace topple::product

@@ -163,7 +163,8 @@ double read_value(const Node& node, const std::string& label, Dimension dimensio
     complaints.error(
         "E205", node.place, label + ": " + written + " is out of range",
         "allowed: " + describe(range, dimension, node.kind == Node::Kind::String ? node.text : std::string()) +
-            (dimension == Dimension::Number && range.high == 1 && value > 1 && value <= 100
+            (dimension == Dimension::Number && range.high == 1 && value > 1 && value <= 100 &&
+                     node.kind != Node::Kind::String
                  ? "; a percentage is written \"" + number_text(value) + " %\""
                  : ""));
     return nan;

@@ -368,6 +368,9 @@ TEST(LongSpans, AreWarnedOfWhereAllSlabsHaveThem) {
   EXPECT_THAT(said(wide),
               testing::ElementsAre(testing::HasSubstr(
                   "and 1 more: spans along y, 8 m between beams along x, though its beams along y are 5 m")));
+  // without beams along x slabs bear both ways
+  EXPECT_THAT(said(replaced(wide, "[[beams]]\nsection = \"beam\"", "[[beams]]\nsection = \"beam\"\nalong = \"y\"")),
+              testing::IsEmpty());
   // one bay that spans the short way is a reason to lay them so
   EXPECT_THAT(said(replaced(wide, "2 = \"8 m\", 3 = \"16 m\"", "2 = \"8 m\", 3 = \"13 m\"")), testing::IsEmpty());
 }
