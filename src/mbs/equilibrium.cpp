@@ -710,14 +710,21 @@ bool DeadLoad::factorise(std::string& message) {
     P.setFromTriplets(t.begin(), t.end());
     K += P;
   }
-  if (!factor_->factorise(K)) {
+  const bool is_regular = factor_->factorise(K);
+  if (!is_regular) {
+    // a pivot of exactly nothing is found as one that is nearly so
+    Sparse ridge(n, n);
+    ridge.setIdentity();
+    K += (1e-15 * K.diagonal().cwiseAbs().maxCoeff()) * ridge;
+  }
+  if (!is_regular && !factor_->factorise(K)) {
     message = "the stiffness matrix of the dead-load equilibrium could not be factorised: the model is a mechanism";
     return false;
   }
   const Vector D = factor_->diagonal();
   Eigen::Index worst = 0;
   const double least = D.minCoeff(&worst);
-  if (least > 1e-13 * D.maxCoeff()) return true;
+  if (is_regular && least > 1e-13 * D.maxCoeff()) return true;
   const Eigen::Index unknown = factor_->unknown_of(worst);
   message = "body \"" +
             s_.model.bodies[static_cast<size_t>(assembly_.free_bodies()[static_cast<size_t>(unknown / u_.each)])].name +

@@ -373,7 +373,7 @@ Vec3 JsonNode::direction() const {
   const Vec3 v = vec3();
   const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
   if (!(largest > 0)) fail("is no direction: all three numbers are 0");
-  const Vec3 scaled = (1 / largest) * v;
+  const Vec3 scaled{v.x / largest, v.y / largest, v.z / largest};  // 1/largest may be infinite
   return (1 / norm(scaled)) * scaled;
 }
 

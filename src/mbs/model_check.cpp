@@ -391,6 +391,9 @@ void Checker::check_lines() {
     finite_not_negative(p, "pretension", c.pretension);
     if (known && c.pretension > 0 && norm(pose_of(c.b) * c.p_B - pose_of(c.a) * c.p_A) == 0)
       fail(p, "pretension", "its ends are at the same place at the start: the line between them has no direction");
+    if (const double length = known ? norm(pose_of(c.b) * c.p_B - pose_of(c.a) * c.p_A) : 0;
+        length > 0 && c.stiffness > 0 && c.pretension > c.stiffness * length)
+      fail(p, "pretension", "stretches it by more than the distance of its ends, so nothing would be left of it");
     not_negative(p, "strength", c.strength);
   }
   for (size_t i = 0; i < m_.springs.size(); ++i) {
