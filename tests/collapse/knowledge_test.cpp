@@ -70,6 +70,10 @@ TEST(Knowledge, RefusesWhatIsNotASet) {
   EXPECT_THAT(complaint_of(replaced(shipped(), "\"contact.frequency\", \"value\": 250",
                                     "\"contact.frequency\", \"value\": 1e30")),
               testing::HasSubstr("\"contact.frequency\" needs a value > 0, at most 100000"));
+  EXPECT_THAT(
+      complaint_of(replaced(shipped(), "\"unit\": \"1/MPa\"", "\"unit\": \"1/Pa\"")),
+      testing::ContainsRegex(":[1-9][0-9]*: error E661: rule \"zone.length_by_bar\" has the unit \"1/MPa\", not "
+                             "\"1/Pa\""));
   EXPECT_THAT(complaint_of(replaced(shipped(), "\"zone.twist_rupture\"", "\"zone.slip_rupture\"")),
               testing::HasSubstr("given twice"));
 }

@@ -564,6 +564,24 @@ TEST(Run, ComparesNoRigidBlockAskewToItsHinges) {
   EXPECT_THAT(block("136 deg"), testing::StartsWith("No comparison: the heads of the columns turn about an axis"));
 }
 
+// The row that lets the block go fires last, but its stage need not begin last.
+TEST(Run, LetsTheRigidBlockGoWithTheLastCharge) {
+  const auto block = [](const std::string& stages) {
+    const record::Record r =
+        run_plan(read(house(stages + "[criteria]\nazimuth = \"180 deg\"\nazimuth_tolerance = \"15 deg\"\n", "1.6 s")),
+                 default_knowledge(), {}, {});
+    return finding(r, "rigid_block").text;
+  };
+  const auto at = [](const std::string& time) { return "[[stage]]\ntime = \"" + time + "\"\n"; };
+  const std::string row = charge("C-A*-0", "0 s", "scatter = \"0 s\"");
+  const std::string fire = row.substr(row.find("[[stage.charge]]"));
+  const std::string little =
+      "[[stage.charge]]\nmembers = \"C-B1-1\"\nposition = \"1.2 m\"\ndestroyed_length = \"10 cm\"\nresidual_bars = 1\n";
+  const std::string stages = block(at("0.2 s") + little + at("0.4 s") + fire);
+  EXPECT_THAT(stages, testing::HasSubstr("would lean by"));
+  EXPECT_EQ(block(at("0.1 s") + fire + "delay = \"0.3 s\"\n" + at("0.2 s") + little), stages);
+}
+
 TEST(Run, TellsThatFramesAreFarApart) {
   const auto run_at = [](double rate) {
     RunOptions o;

@@ -319,6 +319,55 @@ TEST_P(EnginesAlikeReference, EventsAndReleases) {
   EXPECT_LT(r.position.value, 1e-3);  // the trigger is seen at steps, 0.1 ms at some m/s
 }
 
+// The first one takes the angle that the second one waits for, too.
+TEST_P(EnginesAlikeReference, EventsOfOneInstantAreDecidedOnTogether) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_bar(Kind::Revolute, test::z_along_y());
+  const auto other = add_brick(m, "other", {0, 5, 0});
+  mbs::SpringDamper s;
+  s.a = mbs::kGround, s.b = other;
+  s.p_A = {0, 5, 3};
+  s.free_length = 3;
+  s.spring.rate = 500;
+  m.springs.push_back(s);
+  mbs::Trigger t;
+  t.quantity = {mbs::Quantity::Kind::JointAngle, 0};
+  t.component = 3;
+  t.limit = 0.5;
+  for (const auto kind : {mbs::Action::Kind::ReleaseJoint, mbs::Action::Kind::RemoveSpring}) {
+    mbs::Event e;
+    e.triggers = {t};
+    e.actions.resize(1);
+    e.actions[0].kind = kind;
+    e.actions[0].joint = {0}, e.actions[0].index = 0;
+    m.events.push_back(e);
+  }
+  const EngineRun r = compare_with_native(m, 1.5);
+  EXPECT_EQ(r.broken, 1);
+  EXPECT_LT(r.position.value, 2e-3) << "the limit is seen at steps; 2 m where the spring stays";
+}
+
+TEST_P(EnginesAlikeReference, AHingeThatHasBrokenTurnsFreely) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_bar(Kind::Revolute, test::z_along_y());
+  m.joints[0].rotation_limit = 1;
+  mbs::ZoneLaw law;
+  law.moment_y.normal_force = {-1e9, 1e9};
+  law.moment_y.plastic_rotation = {0, 1};
+  law.moment_y.positive = law.moment_y.negative = {1, 1, 1, 1};
+  law.moment_z = law.moment_y;
+  law.rupture_rotation = 0.2;
+  m.laws.push_back(law);
+  mbs::RotationalElement e;
+  e.joint = {0};
+  e.stiffness = 20;
+  e.law = {0};
+  m.rotational_elements.push_back(e);
+  const EngineRun r = compare_with_native(m, 1.5);
+  EXPECT_EQ(r.broken, 1) << "the element, and not the joint";
+  EXPECT_LT(r.position.value, 5e-3);
+}
+
 TEST_P(EnginesAlikeReference, WhatEventsRemoveLeavesWithItsEnergyAtTheEvent) {
   NEEDS_ENGINE();
   using Do = mbs::Action::Kind;

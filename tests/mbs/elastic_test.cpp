@@ -346,6 +346,21 @@ TEST(Equilibrium, TellsAMechanismThatIsOne) {
   EXPECT_NE(s.message.find("mechanism"), std::string::npos) << s.message;
 }
 
+// A pivot of exactly nothing.
+TEST(Equilibrium, NamesABodyOnABushingThatDoesNotTurn) {
+  Model m;
+  add_body(m, make_box("hanger", 3, {0.1, 0.1, 0.1}, {0, 0, -1}));
+  Bushing k;
+  k.a = kGround, k.b = {0};
+  k.X_BM.p = {0, 0, 1};
+  for (int i = 0; i < 3; ++i) k.spring[i].rate = 1e5;
+  m.bushings.push_back(k);
+  m.contact.ground = false;
+  const Summary s = run(m, {});
+  EXPECT_EQ(s.ending, Summary::Ending::NoEquilibrium);
+  EXPECT_NE(s.message.find("\"hanger\""), std::string::npos) << s.message;
+}
+
 TEST(Equilibrium, NamesABodyThatHangsOnNothing) {
   Model m = make_portal(true);
   add_body(m, make_box("orphan", 1, {0.1, 0.1, 0.1}, {9, 9, 9}));

@@ -552,6 +552,14 @@ TEST(CheckModel, FindsEachMistake) {
          m.cables = {c};
        },
        "cables[0].pretension: its ends are at the same place at the start"},
+      {[](Model& m) {
+         Cable c;
+         c.a = kGround, c.b = {0};
+         c.p_A = pose_of(m, c.b) * c.p_B + Vec3{0, 0, 2};
+         c.stiffness = 100, c.pretension = 201;
+         m.cables = {c};
+       },
+       "cables[0].pretension: stretches it by more than the distance of its ends"},
       {[=](Model& m) { m.elements.push_back(crushed(-1)); }, "crush_through: must be finite and not negative"},
       {[=](Model& m) { m.elements.push_back(crushed(1)); }, "crush_through: needs a station"},
       {[](Model& m) { m.springs[0].free_length = -1; }, "free_length: must be finite and not negative"},

@@ -410,6 +410,12 @@ TEST(Rcc, PreparationWeakens) {
   EXPECT_NEAR(compare(in, "cut_bars"), 0.55, 0.1);
   in = make_core(), in.cut_concrete = 0.5;
   compare(in, "cut_concrete");
+  // bars displace what the cut has left
+  const double area = in.section.area(), bars = in.section.steel_area();
+  EXPECT_NEAR(make_rcc(in).EA / whole.EA,
+              (0.5 * (area - bars) * in.concrete.Ec + bars * in.steel.Es) /
+                  ((area - bars) * in.concrete.Ec + bars * in.steel.Es),
+              1e-9);
   in = make_core(), in.concrete_loss = 0.5;
   EXPECT_LT(make_rcc(in).EA, 0.65 * whole.EA);
   compare(in, "concrete_loss");

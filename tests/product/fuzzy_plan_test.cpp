@@ -234,6 +234,13 @@ TEST(FuzzyPlan, InteractionSeesValuesAndWhatFollowsFromThem) {
   EXPECT_EQ(calc_joint(f.interaction, calc_interacting(f, calc_centre(f))), 1);
   EXPECT_TRUE(is_possible(f, calc_centre(f)));
   EXPECT_FALSE(is_possible(f, std::vector{18e6, 28e-4}));
+  // what has no value makes a failed run and no broken constraint
+  std::vector<double> without = values;
+  without[2] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(calc_excess(f.interaction, 1, without), 0);
+  EXPECT_NEAR(calc_joint(f.interaction, without), 1 - 0.287, 1e-12) << "it uses others";
+  without[1] = without[2];
+  EXPECT_EQ(calc_joint(f.interaction, without), 1);
   EXPECT_TRUE(is_possible(f, std::vector{35e6, 28e-4}));
   EXPECT_FALSE(is_possible(f, std::vector{45e6, 28e-4})) << "fct = 3.35 N/mm2";
   EXPECT_FALSE(is_possible(f, std::vector{7e6, 20e-4})) << "fct has no value";

@@ -711,6 +711,17 @@ TEST(Story, TellsOfUsedUpRunsWhatTheyLeftOpen) {
   r.alpha.outputs[0].levels[0].upper.converged = false;
   EXPECT_EQ(find_limit().status, record::Status::Warning);
   EXPECT_NE(find_limit().text.find(": 1 of "), std::string::npos) << find_limit().text;
+  // those within boxes count, too
+  uncertainty::PermissibleBox box;
+  box.kept = true;
+  box.outputs = r.alpha.outputs;
+  r.insights.has_boxes = true, r.insights.boxes.boxes = {box};
+  EXPECT_NE(find_limit().text.find(": 2 of "), std::string::npos) << find_limit().text;
+  // of the number that is usual where none is asked for
+  Problem q = p;
+  q.limit = 0;
+  for (const Sentence& s : tell(q, r))
+    if (s.id == "limit") { EXPECT_TRUE(s.text.starts_with("Of the runs that were allowed ")) << s.text; }
 }
 
 TEST(Story, GuaranteesNothingOfABoxThatIsBroken) {
