@@ -202,22 +202,29 @@ HWY_INLINE Num<D> calc_mobility(const double* HWY_RESTRICT g, const double* held
   return fma(load<D>(g, kGroupsA), of_a, load<D>(g, kGroupsB) * of_b);
 }
 
-/// Forces of a group's dashpots along several directions, before their limits.
-///   time, at  within the step, whose speed they see [s], [1]
+/// Forces of a group's dashpots along several directions, of its first points; gives the lanes that have no others.
 template <class D>
-HWY_NOINLINE hn::Mask<D> damp_group(const ContactJob& job, size_t block, const Motion<D>& change, Num<D> time,
-                                    Num<D> at, Num<D>* force) {
-  const size_t W = hn::Lanes(D());
+HWY_NOINLINE hn::Mask<D> damp_group(const ContactJob& job, size_t block, const Motion<D>& change,
+                                    const Damper<D>& damper, Num<D>* force) {
+  const D d;
+  const size_t W = hn::Lanes(d);
   const double *g = job.groups + block * kGroupFields * W, *held = held_of(job, block, W);
   const V3<D> n = load3<D>(g, kNormal), apart = load3<D>(g, kApart);
-  const size_t first = job.rows[block], count = job.rows[block + 1] - first;
+  const Num<D> band = num<D>(0) - load<D>(g, kBand), most = load<D>(g, kMost), zero = num<D>(0);
+  const size_t first = job.rows[block], all = job.rows[block + 1] - first, count = std::min(all, kMostDamped);
   V3<D> lever[kMostDamped];
-  Num<D> rate[kMostDamped], speed[kMostDamped];
+  Num<D> rate[kMostDamped], speed[kMostDamped], low[kMostDamped], top[kMostDamped];
+  const auto point = [&](size_t i) { return job.points + (first + i) * kPointFields * W; };
   for (size_t i = 0; i < count; ++i) {
-    const double* p = job.points + (first + i) * kPointFields * W;
+    const double* p = point(i);
+    const Num<D> full = load<D>(p, kFull);
     lever[i] = cross(load3<D>(p, kPlace), n), rate[i] = load<D>(p, kRate);
-    speed[i] = fma(at, dot(n, change.v) + dot(lever[i], change.w), load<D>(p, kApproach));
+    speed[i] = fma(damper.at, dot(n, change.v) + dot(lever[i], change.w), load<D>(p, kApproach));
+    force[i] = damper.share * rate[i] * speed[i];
+    low[i] = band * full, top[i] = select(hn::Gt(full.v, zero.v), most * full, zero);
   }
+  auto has_others = hn::FirstN(d, 0);
+  for (size_t i = count; i < all; ++i) has_others = hn::Or(has_others, hn::Gt(load<D>(point(i), kRate).v, zero.v));
   const auto slow = [&](Num<D> against, const V3<D>& torque) {
     const V3<D> push = against * n, torque_b = torque - cross(apart, push);  // on b, and against what acts on a
     V3<D> va = load<D>(g, kMassA) * push, wa = num<D>(-1) * times<D>(g, kInertiaA, torque);
@@ -231,8 +238,10 @@ HWY_NOINLINE hn::Mask<D> damp_group(const ContactJob& job, size_t block, const M
     const V3<D> spin_b = b * wb;
     return Slowed<D>{dot(n, (a * va + b * vb) + cross(spin_b, apart)), a * wa + spin_b};
   };
-  return damp_along_several<D>(
-      count, [&](size_t i) { return lever[i]; }, [&](size_t i) { return rate[i]; }, slow, time, speed, force);
+  damp_along_several<D>(
+      count, [&](size_t i) { return lever[i]; }, [&](size_t i) { return rate[i]; }, slow, num<D>(job.h) * damper.at,
+      speed, low, top, force);
+  return hn::Not(has_others);
 }
 
 template <class D>
@@ -390,7 +399,6 @@ HWY_INLINE void damp_block(const ContactJob& job, size_t block) {
   const Damper<D> damper(h, mobility, power);
   const Num<D> band = zero - load<D>(g, kBand), most = load<D>(g, kMost);
   Num<D> several[kMostDamped];
-  const size_t points = last - first;
   // of a body that shares its mass with no other group, on what is fixed, and no plain dashpots
   const auto is_alone_on = [&](int groups, int mass) {
     return hn::And(hn::Eq(load<D>(g, groups).v, hn::Set(d, 1)), hn::Eq(load<D>(g, mass).v, hn::Zero(d)));
@@ -398,20 +406,19 @@ HWY_INLINE void damp_block(const ContactJob& job, size_t block) {
   const auto is_alone = hn::Or(is_alone_on(kGroupsA, kMassB), is_alone_on(kGroupsB, kMassA));
   auto along_several =
       hn::AndNot(hn::Or(hn::Ge(together.v, hn::Zero(d)), hn::Ge(load<D>(g, kDamping).v, hn::Zero(d))), is_alone);
-  const bool has_several = points > 1 && points <= kMostDamped && !hn::AllFalse(d, along_several);
-  if (has_several)
-    along_several = hn::And(along_several, damp_group<D>(job, block, change, h * damper.at, damper.at, several));
+  const bool has_several = last - first > 1 && !hn::AllFalse(d, along_several);
+  if (has_several) along_several = hn::And(along_several, damp_group<D>(job, block, change, damper, several));
   Num<D> total = zero;
   sum = zero, torque = zeros<D>();
   for (size_t row = first; row < last; ++row) {
     double* p = point(row);
     const V3<D> la = cross(load3<D>(p, kPlace), n);
     const Num<D> v = fma(damper.at, along + dot(la, change.w), load<D>(p, kApproach)), full = load<D>(p, kFull);
-    Num<D> free = damper.share * load<D>(p, kRate) * v;
-    if (has_several) free = select(along_several, several[row - first], free);
+    const Num<D> free = damper.share * load<D>(p, kRate) * v;
     // the upper end may be infinite, where nothing is pressed too
     const Num<D> top = select(hn::Gt(full.v, hn::Zero(d)), most * full, zero);
-    const Num<D> f = {hn::Min(hn::Max(free.v, (band * full).v), top.v)};
+    Num<D> f = {hn::Min(hn::Max(free.v, (band * full).v), top.v)};
+    if (has_several && row - first < kMostDamped) f = select(along_several, several[row - first], f);
     const Num<D> force = load<D>(p, kNormalForce) + f;
     store<D>(force, p, kNormalForce);
     total = total + force;

@@ -233,31 +233,32 @@ HWY_INLINE void press_ground_block(const GroundJob& job, size_t block) {
       torque = fma(zero - f, lever, torque);
     }
     const Damper<D> damper(h, mobility_of({(zero - sum) * n, torque}), power);
-    N free[kCorners];
-    V3<D> levers[kCorners];
-    for (int i = 0; i < count; ++i) levers[i] = cross(corner[i].place, n);
-    const auto speed_of = [&](int i) { return fma(damper.at, along + dot(levers[i], dw), corner[i].approach); };
-    for (int i = 0; i < count; ++i) free[i] = damper.share * corner[i].rate * speed_of(i);
-    if (count > 1) {
-      N speed[kCorners], force[kCorners];
-      for (int i = 0; i < count; ++i) speed[i] = speed_of(i);
-      const M along_several =
-          hn::AndNot(plain, damp_along_several<D>(
-                                static_cast<size_t>(count), [&](size_t i) { return levers[i]; },
-                                [&](size_t i) { return corner[i].rate; },
-                                [&](N against, const V3<D>& turning) {
-                                  return Slowed<D>{mass * against, num<D>(-1) * (inertia * turning)};
-                                },
-                                h * damper.at, speed, force));
-      for (int i = 0; i < count; ++i) free[i] = select(along_several, force[i], free[i]);
-    }
     const N band = zero - load<D>(constants, kGroundBand), most = load<D>(constants, kGroundMost);
+    N forces[kCorners], speed[kCorners], low[kCorners], top[kCorners];
+    V3<D> levers[kCorners];
+    for (int i = 0; i < count; ++i) {
+      const Corner<D>& c = corner[i];
+      levers[i] = cross(c.place, n);
+      speed[i] = fma(damper.at, along + dot(levers[i], dw), c.approach);
+      forces[i] = damper.share * c.rate * speed[i];
+      low[i] = band * c.full;
+      // the upper end may be infinite, where nothing is pressed too
+      top[i] = select(hn::Gt(c.full.v, zero.v), most * c.full, zero);
+    }
+    N all[kCorners];
+    for (int i = 0; i < count; ++i) all[i] = forces[i];
+    if (count > 1)
+      damp_along_several<D>(
+          static_cast<size_t>(count), [&](size_t i) { return levers[i]; }, [&](size_t i) { return corner[i].rate; },
+          [&](N against, const V3<D>& turning) {
+            return Slowed<D>{mass * against, num<D>(-1) * (inertia * turning)};
+          },
+          h * damper.at, speed, low, top, all);
     total = sum = zero;
     for (int i = 0; i < count; ++i) {
       Corner<D>& c = corner[i];
-      // the upper end may be infinite, where nothing is pressed too
-      const N top = select(hn::Gt(c.full.v, zero.v), most * c.full, zero);
-      const N f = minimum(maximum(free[i], band * c.full), top);
+      const N f = count > 1 ? select(plain, minimum(maximum(forces[i], low[i]), top[i]), all[i])
+                            : minimum(maximum(forces[i], low[i]), top[i]);
       c.normal = c.normal + f;
       total = total + c.normal;
       sum = sum + f;

@@ -448,8 +448,9 @@ struct Evaluation {
         };
         // where the curve falls while the zone shortens, one more look at it after the first estimate; where it rises
         // it may be steeper than the spring
-        const double begin = limit;
-        const bool is_found = !p.is_at_rest && (shorten_under(shortening), limit <= begin);
+        const double begin = limit, next = limits.next_shortening(z.shortened);
+        const bool rises = next < kUnlimited && limits.compression(strained, next, limits.integrity(next)) > begin;
+        const bool is_found = !p.is_at_rest && !rises && (shorten_under(shortening), limit <= begin);
         if (!is_found)
           find_on_law(0, shorten_under,
                       [&](double by) { return limits.next_shortening(z.shortened + by) - z.shortened; });
@@ -479,8 +480,9 @@ struct Evaluation {
           elongation = (force[0] - limit) / k[0];
           return elongation - by;
         };
-        const double begin = limit;
-        const bool is_found = !p.is_at_rest && (elongate_under(elongation), limit <= begin);
+        const double begin = limit, next = limits.next_elongation(z.elongated);
+        const bool rises = !is_far && next < kUnlimited && limits.tension(next, z.shortened) > begin;
+        const bool is_found = !p.is_at_rest && !rises && (elongate_under(elongation), limit <= begin);
         if (!is_found)
           find_on_law(0, elongate_under,
                       [&](double by) { return limits.next_elongation(z.elongated + by) - z.elongated; });

@@ -172,15 +172,20 @@ bool has_open_knowing(const Insights& in) {
   });
 }
 
+bool has_open_bounds(const std::vector<uncertainty::OutputBounds>& outputs) {
+  for (const auto& o : outputs)
+    for (const auto& l : o.levels)
+      if ((l.lower.sample >= 0 && !l.lower.converged) || (l.upper.sample >= 0 && !l.upper.converged)) return true;
+  return false;
+}
+
 bool has_open_bounds(const uncertainty::AlphaResult& alpha) {
-  const auto is_open = [](const std::vector<uncertainty::OutputBounds>& outputs) {
-    for (const auto& o : outputs)
-      for (const auto& l : o.levels)
-        if ((l.lower.sample >= 0 && !l.lower.converged) || (l.upper.sample >= 0 && !l.upper.converged)) return true;
-    return false;
-  };
-  return is_open(alpha.outputs) ||
-         std::ranges::any_of(alpha.classes, [&](const auto& c) { return is_open(c.outputs); });
+  return has_open_bounds(alpha.outputs) ||
+         std::ranges::any_of(alpha.classes, [](const auto& c) { return has_open_bounds(c.outputs); });
+}
+
+bool has_open_boxes(const Insights& in) {
+  return std::ranges::any_of(in.boxes.boxes, [](const auto& b) { return b.kept && has_open_bounds(b.outputs); });
 }
 
 bool is_any_open(const std::vector<uncertainty::Possibility>& found) {
@@ -485,8 +490,8 @@ class Manager {
     // a search that had a part of the runs may have ended with them and left nothing open
     const bool is_alpha_open = r.alpha.ending == Ending::LimitReached ? is_used_up || has_open_bounds(r.alpha)
                                                                       : r.alpha.ending != Ending::Complete;
-    const bool is_open = is_alpha_open || has_open_knowing(r.insights) || is_any_open(r.possibilities.classes) ||
-                         is_any_open(r.requirement) || is_any_open(r.limits);
+    const bool is_open = is_alpha_open || has_open_boxes(r.insights) || has_open_knowing(r.insights) ||
+                         is_any_open(r.possibilities.classes) || is_any_open(r.requirement) || is_any_open(r.limits);
     if (!is_open) return Ending::Complete;
     // a search of bounds keeps a few runs for its last steps
     const bool is_cut = is_used_up || r.alpha.ending == Ending::LimitReached;
