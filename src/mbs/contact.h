@@ -254,8 +254,8 @@ struct ContactScratch {
   std::vector<JointedMobility> mobility;
   std::vector<int> mobility_of;    // of each body, -1: none (B)
   std::vector<int> read_clusters;  // of each cluster in this look, into Touching::jointed_clusters, -1: not yet
-  std::vector<Vec3> push_before, turn_before;  // all forces on jointed bodies in the step before (B)
-  std::vector<double> joint_rates;             // of a cluster's rows
+  std::vector<Vec3> force_before, torque_before;  // all forces on jointed bodies in the step before (B)
+  std::vector<double> joint_rates;                // of a cluster's rows
   std::vector<int> first_of_cluster, next_of_cluster;
   DisjointSets units;                      // of touched bodies that move as one
   std::vector<int> island, count;          // of touched bodies

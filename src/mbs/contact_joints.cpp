@@ -321,13 +321,13 @@ void System::fill_held_blocks() {
   for (const ContactGroup& g : t.group) write(g, g.a, 0), write(g, g.b, 1);
 }
 
-void System::keep_pushes() {
+void System::keep_forces() {
   if (!model.contact.ground && !model.contact.bodies) return;
-  contact.push_before.resize(B), contact.turn_before.resize(B);
+  contact.force_before.resize(B), contact.torque_before.resize(B);
   for (const JointCluster& c : clusters)
     for (const int body : c.bodies) {
       const size_t b = static_cast<size_t>(body);
-      contact.push_before[b] = force[b], contact.turn_before[b] = torque[b];
+      contact.force_before[b] = force[b], contact.torque_before[b] = torque[b];
     }
 }
 
@@ -346,7 +346,7 @@ void System::foresee_joints(double h) {
       for (size_t y = c.first_meeting; y < c.last_meeting; ++y) {
         const JointMeeting& m = t.meetings[y];
         const size_t b = static_cast<size_t>(m.body), rows = static_cast<size_t>(m.rows);
-        const Vec3 push = contact.push_before[b] - Vec3(force[b]), turn = contact.turn_before[b] - Vec3(torque[b]);
+        const Vec3 push = contact.force_before[b] - Vec3(force[b]), turn = contact.torque_before[b] - Vec3(torque[b]);
         double less[6] = {push.x, push.y, push.z, turn.x, turn.y, turn.z};
         if (model.is_planar) less[1] = less[3] = less[5] = 0;
         for (size_t i = 0; i < 6; ++i)

@@ -578,7 +578,7 @@ void System::evaluate_forces() {
 void System::begin_forces() {
   ground_reaction = {};
   ground_contact = {};
-  keep_pushes();
+  keep_forces();
   fire_events();
 }
 

@@ -537,7 +537,7 @@ class System {
   void hold_contacts();
   void fill_held_blocks();
   /// Keeps the forces of the step that ends, which the joints have answered.
-  void keep_pushes();
+  void keep_forces();
   /// What joints answer to the forces known so far beyond their answer in the step before.
   void foresee_joints(double h);
   /// Adds that to the speeds, and takes from what forces of contact change what joints take.
