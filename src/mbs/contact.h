@@ -184,6 +184,7 @@ struct JointedBody {
 /// A cluster one of whose bodies touches something.
 struct JointedCluster {
   int rows = 0;
+  size_t first_rate = 0;                       // into ContactScratch::joint_rates
   size_t first_meeting = 0, last_meeting = 0;  // into Touching::meetings
 };
 
@@ -255,7 +256,7 @@ struct ContactScratch {
   std::vector<int> mobility_of;    // of each body, -1: none (B)
   std::vector<int> read_clusters;  // of each cluster in this look, into Touching::jointed_clusters, -1: not yet
   std::vector<Vec3> force_before, torque_before;  // all forces on jointed bodies in the step before (B)
-  std::vector<double> joint_rates;                // of a cluster's rows
+  std::vector<double> joint_rates;                // of the rows of all jointed clusters
   std::vector<int> first_of_cluster, next_of_cluster;
   DisjointSets units;                      // of touched bodies that move as one
   std::vector<int> island, count;          // of touched bodies

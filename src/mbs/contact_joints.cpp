@@ -71,8 +71,11 @@ void System::begin_holding() {
 int System::read_meetings(JointCluster& c) {
   Touching& t = state.touching;
   read_cluster(c, kDependent);
+  const size_t first_rate = t.jointed_clusters.empty() ? 0
+                                                       : t.jointed_clusters.back().first_rate +
+                                                             static_cast<size_t>(t.jointed_clusters.back().rows);
   JointedCluster& to = t.jointed_clusters.emplace_back();
-  to.rows = c.matrix.rows();
+  to.rows = c.matrix.rows(), to.first_rate = first_rate;
   to.first_meeting = t.meetings.size();
   for (size_t k = 0; k < c.bodies.size(); ++k) {
     const size_t b = static_cast<size_t>(c.bodies[k]);
@@ -334,30 +337,29 @@ void System::keep_forces() {
 void System::foresee_joints(double h) {
   Touching& t = state.touching;
   std::vector<double>& rates = contact.joint_rates;
-  int of = -1;  // whose rates these are
+  rates.clear();
+  for (const JointedCluster& c : t.jointed_clusters) {
+    rates.resize(c.first_rate + static_cast<size_t>(c.rows), 0.0);
+    for (size_t y = c.first_meeting; y < c.last_meeting; ++y) {
+      const JointMeeting& m = t.meetings[y];
+      const size_t b = static_cast<size_t>(m.body), rows = static_cast<size_t>(m.rows);
+      const Vec3 push = contact.force_before[b] - Vec3(force[b]), turn = contact.torque_before[b] - Vec3(torque[b]);
+      double less[6] = {push.x, push.y, push.z, turn.x, turn.y, turn.z};
+      if (model.is_planar) less[1] = less[3] = less[5] = 0;
+      double* of_joint = &rates[c.first_rate + static_cast<size_t>(m.first_row)];
+      for (size_t i = 0; i < 6; ++i)
+        for (size_t r = 0; r < rows; ++r) of_joint[r] += less[i] * t.meeting_rows[m.at + i * rows + r];
+    }
+  }
   for (JointedBody& held : t.held) {
     held.more_v = held.more_w = {};
     if (held.cluster < 0) continue;
     const JointedCluster& c = t.jointed_clusters[static_cast<size_t>(held.cluster)];
     const size_t n = static_cast<size_t>(c.rows);
-    if (held.cluster != of) {
-      of = held.cluster;
-      rates.assign(n, 0);
-      for (size_t y = c.first_meeting; y < c.last_meeting; ++y) {
-        const JointMeeting& m = t.meetings[y];
-        const size_t b = static_cast<size_t>(m.body), rows = static_cast<size_t>(m.rows);
-        const Vec3 push = contact.force_before[b] - Vec3(force[b]), turn = contact.torque_before[b] - Vec3(torque[b]);
-        double less[6] = {push.x, push.y, push.z, turn.x, turn.y, turn.z};
-        if (model.is_planar) less[1] = less[3] = less[5] = 0;
-        for (size_t i = 0; i < 6; ++i)
-          for (size_t r = 0; r < rows; ++r)
-            rates[static_cast<size_t>(m.first_row) + r] += less[i] * t.meeting_rows[m.at + i * rows + r];
-      }
-    }
-    const double* answers = &t.joint_answers[held.first_answer];
+    const double *answers = &t.joint_answers[held.first_answer], *rate = &rates[c.first_rate];
     const auto sum = [&](size_t i) {
       double all = 0;
-      for (size_t r = 0; r < n; ++r) all += answers[i * n + r] * rates[r];
+      for (size_t r = 0; r < n; ++r) all += answers[i * n + r] * rate[r];
       return h * all;
     };
     held.more_v = {sum(0), sum(1), sum(2)};

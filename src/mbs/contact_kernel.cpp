@@ -202,10 +202,11 @@ HWY_INLINE Num<D> calc_mobility(const double* HWY_RESTRICT g, const double* held
   return fma(load<D>(g, kGroupsA), of_a, load<D>(g, kGroupsB) * of_b);
 }
 
-/// Forces of a group's dashpots along several directions, of its first points; gives the lanes that have no others.
+/// Forces of the dashpots of a group's first points within their limits, along several directions where that is wanted
+/// and there are no other points.
 template <class D>
-HWY_NOINLINE hn::Mask<D> damp_group(const ContactJob& job, size_t block, const Motion<D>& change,
-                                    const Damper<D>& damper, Num<D>* force) {
+HWY_NOINLINE void damp_group(const ContactJob& job, size_t block, const Motion<D>& change, const Damper<D>& damper,
+                             hn::Mask<D> wanted, Num<D>* force) {
   const D d;
   const size_t W = hn::Lanes(d);
   const double *g = job.groups + block * kGroupFields * W, *held = held_of(job, block, W);
@@ -223,8 +224,7 @@ HWY_NOINLINE hn::Mask<D> damp_group(const ContactJob& job, size_t block, const M
     force[i] = damper.share * rate[i] * speed[i];
     low[i] = band * full, top[i] = select(hn::Gt(full.v, zero.v), most * full, zero);
   }
-  auto has_others = hn::FirstN(d, 0);
-  for (size_t i = count; i < all; ++i) has_others = hn::Or(has_others, hn::Gt(load<D>(point(i), kRate).v, zero.v));
+  for (size_t i = count; i < all; ++i) wanted = hn::AndNot(hn::Gt(load<D>(point(i), kRate).v, zero.v), wanted);
   const auto slow = [&](Num<D> against, const V3<D>& torque) {
     const V3<D> push = against * n, torque_b = torque - cross(apart, push);  // on b, and against what acts on a
     V3<D> va = load<D>(g, kMassA) * push, wa = num<D>(-1) * times<D>(g, kInertiaA, torque);
@@ -240,8 +240,7 @@ HWY_NOINLINE hn::Mask<D> damp_group(const ContactJob& job, size_t block, const M
   };
   damp_along_several<D>(
       count, [&](size_t i) { return lever[i]; }, [&](size_t i) { return rate[i]; }, slow, num<D>(job.h) * damper.at,
-      speed, low, top, force);
-  return hn::Not(has_others);
+      speed, low, top, wanted, force);
 }
 
 template <class D>
@@ -404,10 +403,10 @@ HWY_INLINE void damp_block(const ContactJob& job, size_t block) {
     return hn::And(hn::Eq(load<D>(g, groups).v, hn::Set(d, 1)), hn::Eq(load<D>(g, mass).v, hn::Zero(d)));
   };
   const auto is_alone = hn::Or(is_alone_on(kGroupsA, kMassB), is_alone_on(kGroupsB, kMassA));
-  auto along_several =
+  const auto along_several =
       hn::AndNot(hn::Or(hn::Ge(together.v, hn::Zero(d)), hn::Ge(load<D>(g, kDamping).v, hn::Zero(d))), is_alone);
-  const bool has_several = last - first > 1 && !hn::AllFalse(d, along_several);
-  if (has_several) along_several = hn::And(along_several, damp_group<D>(job, block, change, damper, several));
+  const size_t found = last - first > 1 && !hn::AllFalse(d, along_several) ? std::min(last - first, kMostDamped) : 0;
+  if (found > 0) damp_group<D>(job, block, change, damper, along_several, several);
   Num<D> total = zero;
   sum = zero, torque = zeros<D>();
   for (size_t row = first; row < last; ++row) {
@@ -418,7 +417,7 @@ HWY_INLINE void damp_block(const ContactJob& job, size_t block) {
     // the upper end may be infinite, where nothing is pressed too
     const Num<D> top = select(hn::Gt(full.v, hn::Zero(d)), most * full, zero);
     Num<D> f = {hn::Min(hn::Max(free.v, (band * full).v), top.v)};
-    if (has_several && row - first < kMostDamped) f = select(along_several, several[row - first], f);
+    if (row - first < found) f = several[row - first];
     const Num<D> force = load<D>(p, kNormalForce) + f;
     store<D>(force, p, kNormalForce);
     total = total + force;

@@ -245,20 +245,19 @@ HWY_INLINE void press_ground_block(const GroundJob& job, size_t block) {
       // the upper end may be infinite, where nothing is pressed too
       top[i] = select(hn::Gt(c.full.v, zero.v), most * c.full, zero);
     }
-    N all[kCorners];
-    for (int i = 0; i < count; ++i) all[i] = forces[i];
     if (count > 1)
       damp_along_several<D>(
           static_cast<size_t>(count), [&](size_t i) { return levers[i]; }, [&](size_t i) { return corner[i].rate; },
           [&](N against, const V3<D>& turning) {
             return Slowed<D>{mass * against, num<D>(-1) * (inertia * turning)};
           },
-          h * damper.at, speed, low, top, all);
+          h * damper.at, speed, low, top, hn::Not(plain), forces);
+    else
+      forces[0] = minimum(maximum(forces[0], low[0]), top[0]);
     total = sum = zero;
     for (int i = 0; i < count; ++i) {
       Corner<D>& c = corner[i];
-      const N f = count > 1 ? select(plain, minimum(maximum(forces[i], low[i]), top[i]), all[i])
-                            : minimum(maximum(forces[i], low[i]), top[i]);
+      const N f = forces[i];
       c.normal = c.normal + f;
       total = total + c.normal;
       sum = sum + f;
