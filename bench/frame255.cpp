@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/heap.h"
 #include "cpu_time.h"
 #include "frame.h"
 #include "mbs/batch.h"
@@ -63,6 +64,7 @@ BENCHMARK(frame255_contact)->Arg(0)->Unit(benchmark::kMillisecond)->UseManualTim
 /// An ensemble of the frame with connections of varied strength, one thread; ground contact. Compiling and equilibrium
 /// of every sample are in the time.
 void frame255_ensemble(benchmark::State& state) {
+  keep_freed_memory();  // as studies do
   mbs::Model model = make_frame();
   model.contact.bodies = false;
   const size_t count = static_cast<size_t>(state.range(0));

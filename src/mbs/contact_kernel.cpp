@@ -238,8 +238,8 @@ HWY_NOINLINE void damp_group(const ContactJob& job, size_t block, const Motion<D
     const V3<D> spin_b = b * wb;
     return Slowed<D>{dot(n, (a * va + b * vb) + cross(spin_b, apart)), a * wa + spin_b};
   };
-  damp_along_several<D>(
-      count, [&](size_t i) { return lever[i]; }, [&](size_t i) { return rate[i]; }, slow, num<D>(job.h) * damper.at,
+  damp_all_motions<D>(
+      count, n, [&](size_t i) { return lever[i]; }, [&](size_t i) { return rate[i]; }, slow, num<D>(job.h) * damper.at,
       speed, low, top, wanted, force);
 }
 

@@ -246,8 +246,8 @@ HWY_INLINE void press_ground_block(const GroundJob& job, size_t block) {
       top[i] = select(hn::Gt(c.full.v, zero.v), most * c.full, zero);
     }
     if (count > 1)
-      damp_along_several<D>(
-          static_cast<size_t>(count), [&](size_t i) { return levers[i]; }, [&](size_t i) { return corner[i].rate; },
+      damp_all_motions<D>(
+          static_cast<size_t>(count), n, [&](size_t i) { return levers[i]; }, [&](size_t i) { return corner[i].rate; },
           [&](N against, const V3<D>& turning) {
             return Slowed<D>{mass * against, num<D>(-1) * (inertia * turning)};
           },
