@@ -81,6 +81,7 @@ bool read_storeys(Reading& reading, TableReader& root) {
   constexpr Range loads{0, 100e3};
   plan.storey_loads.assign(plan.storey_heights.size(), 0);
   if (const Node* load = table.find("load")) {
+    reading.load_place = load->place;
     if (load->kind != Node::Kind::Array) {
       const double weight = read_quantity(*load, "storeys: load", Dimension::AreaLoad, loads, reading.complaints);
       plan.storey_loads.assign(plan.storey_heights.size(), calc_floor_mass(weight));

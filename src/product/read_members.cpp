@@ -350,6 +350,22 @@ void apply_overrides(Builder& builder, TableReader& root) {
   }
 }
 
+/// Loads of floors without a slab have nothing that carries them.
+void warn_of_lost_loads(Reading& reading) {
+  const Plan& plan = reading.plan;
+  std::set<size_t> with_slab;
+  for (const Member& m : plan.members)
+    if (m.kind == MemberKind::Slab) with_slab.insert(static_cast<size_t>(m.storey));
+  std::vector<std::string> without;
+  for (size_t s = 0; s < plan.storey_loads.size(); ++s)
+    if (plan.storey_loads[s] > 0 && !with_slab.count(s)) without.push_back(std::to_string(s));
+  if (!without.empty())
+    reading.complaints.warn(
+        "W514", reading.load_place,
+        "load: is left out above storey " + list_of(without) + ", where there is no slab to carry it",
+        "add slabs, or give a list with 0 there");
+}
+
 void warn_of_unused(Reading& reading) {
   Plan& plan = reading.plan;
   for (const Member& m : plan.members) {
@@ -475,7 +491,9 @@ void read_members(Reading& reading, TableReader& root) {
   // without them others hang in the air
   if (!reading.knows_members) return;
   check_support(plan, drafts, reading.complaints);
-  if (reading.complaints.error_count() == 0) warn_of_unused(reading);
+  if (reading.complaints.error_count() > 0) return;
+  warn_of_lost_loads(reading);
+  warn_of_unused(reading);
 }
 
 void read_preparation(Reading& reading, TableReader& root) {

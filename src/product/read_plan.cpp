@@ -30,7 +30,7 @@ Plan read_plan_document(const Node& document, const std::string& name, Complaint
   std::vector<AskedQuantity> asked;
   const bool is_fuzzy = !is_sample && document.find("fuzzy");
   if (is_fuzzy) complaints.asked = &asked;
-  Reading reading{plan, complaints, {}, {}, {}, {}, {}, false, true, {}, {}, {}, {}, {}};
+  Reading reading{plan, complaints, {}, {}, {}, {}, {}, false, true, {}, {}, {}, {}, {}, {}};
   TableReader root(document, "", complaints);
   plan.title = root.text("title", "untitled");
   read_site(reading, root);

@@ -73,7 +73,7 @@ SectionFile read_section_document(const Node& document, const std::string& name,
       throw InputError(complaints.all());
     }
   Plan plan;
-  Reading reading{plan, complaints, {}, {}, {}, {}, {}, false, true, {}, {}, {}, {}, {}};
+  Reading reading{plan, complaints, {}, {}, {}, {}, {}, false, true, {}, {}, {}, {}, {}, {}};
   TableReader root(document, "", complaints);
   out.title = root.text("title", "untitled");
   read_materials(reading, root);

@@ -26,6 +26,7 @@ struct Reading {
   std::vector<bool> section_is_used, panel_is_used;
   std::vector<Place> section_places, panel_places;
   std::vector<Place> shaft_places;  // of the shafts' positions
+  Place load_place;                 // of the storeys' loads
 };
 
 /// The bytes of a file of at most 8 MB; `what` it should be stands in the complaints. Throws InputError E106, E107.

@@ -375,6 +375,16 @@ TEST(LongSpans, AreWarnedOfWhereAllSlabsHaveThem) {
   EXPECT_THAT(said(replaced(wide, "2 = \"8 m\", 3 = \"16 m\"", "2 = \"8 m\", 3 = \"13 m\"")), testing::IsEmpty());
 }
 
+TEST(LostLoads, AreWarnedOf) {
+  const auto said = [](const std::string& text) { return said_with("W514", text); };
+  const std::string plan = small_plan(), bare = replaced(plan, "panel = \"floor\"", "panel = \"floor\"\nstoreys = 1");
+  EXPECT_THAT(said(plan), testing::IsEmpty());
+  EXPECT_THAT(said(bare),
+              testing::ElementsAre("48: load: is left out above storey 0, where there is no slab to carry it"));
+  EXPECT_THAT(said(replaced(bare, "load = \"1 kN/m2\"", "load = [\"0 kN/m2\", \"1 kN/m2\"]")), testing::IsEmpty());
+  EXPECT_THAT(said(replaced(bare, "load = \"1 kN/m2\"", "load = [\"1 kN/m2\", \"0 kN/m2\"]")), testing::SizeIs(1));
+}
+
 TEST(IdleWalls, AreWarnedOf) {
   // walls along x take shear from the beam that lies on them
   const auto idle = [](const std::string& text) { return said_with("W511", text); };
