@@ -407,17 +407,19 @@ void add_replay(CLI::App& app, Arguments& a) {
   add_examples(replay, R"(  topple replay steer/plan.steer.jsonl -o again)");
 }
 
+/// Refuses a value of blanks alone.
+auto is_given(const char* what) {
+  return [what](const std::string& s) {
+    return s.find_first_not_of(" \t\r\n") == std::string::npos ? std::string(what) + " is wanted" : std::string();
+  };
+}
+
 void add_study(CLI::App& app, Arguments& a) {
   StudyArguments& y = a.study;
   CLI::App* study = app.add_subcommand("study", "Fuzzy analysis: many runs, and what follows from them.");
   study->add_option("file", a.input, "plan with [fuzzy], or fuzzy inputs of an evaluator (TOML)")->type_name("FILE");
   study->add_option("-o,--output", a.output, "folder of the study; the same command again goes on with it")
       ->type_name("FOLDER");
-  const auto is_given = [](const char* what) {
-    return [what](const std::string& s) {
-      return s.find_first_not_of(" \t\r\n") == std::string::npos ? std::string(what) + " is wanted" : std::string();
-    };
-  };
   study
       ->add_option("--evaluator", y.evaluator,
                    "command that is the model: reads points and writes answers as JSON lines (docs/study.md)")
@@ -493,6 +495,8 @@ void add_worker(CLI::App& app, Arguments& a) {
       ->required();
   worker->add_option("--idle", y.idle, "end after so long without work, such as \"10 min\"; else when no study is open")
       ->type_name("QUANTITY");
+  worker->add_option("--name", y.name, "of the one study on the server to work for; those of all if left out")
+      ->check(is_given("a name"));
   add_worker_options(worker, y);
   add_json(worker, a);
   worker->callback([&a] { a.verb = Arguments::Verb::Worker; });

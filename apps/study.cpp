@@ -59,6 +59,31 @@ int complain(const InputError& e, const std::string& text, bool as_json) {
   return kBadInput;
 }
 
+void read_what_is_there(const StudyPlace& place, study::Problem& problem, StudyResult& r) {
+  study::Store store(place.store);
+  const std::optional<study::StudyRow> row = store.find_study(place.name);
+  if (!row) return;
+  problem = read_problem(*row);
+  r = study::read_study(problem, store, *row);
+}
+
+/// Throws InputError E822 if a folder for files is that of another study than `from`.
+void check_target(const std::string& folder, const StudyPlace& from) {
+  StudyPlace there;
+  try {
+    there = find_place(folder);
+  } catch (const InputError&) {
+    return;  // of none
+  }
+  std::error_code failure;
+  const bool is_same = study::is_server(there.store) || study::is_server(from.store)
+                           ? there.store == study::hide_password(from.store) && there.name == from.name
+                           : std::filesystem::equivalent(there.store, from.store, failure);
+  if (!is_same)
+    throw InputError("E822", fmt::format("{} holds another study, whose files these would replace", folder),
+                     "choose another folder");
+}
+
 int start(const Arguments& a, const std::atomic<bool>& cancel) {
   std::string text;
   study::Problem problem;
@@ -70,6 +95,9 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
     problem = read_problem(a, text);
     options.pool = make_pool_options(a.study);
     place = make_place(a);
+    keep_runs_apart(problem, place);
+    if (study::is_server(place.store) && !a.study.evaluator.empty())
+      options.directory = std::filesystem::current_path().string();
   } catch (const InputError& e) { return complain(e, text, a.json); }
   options.store = place.store;
   options.name = place.name;
@@ -86,6 +114,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   progress.cancel = &cancel;
   ProgressLine line;
   StudyResult r;
+  bool is_finished = false;
   long answers = 0;
   const auto remove_new = [&] { return is_new && remove_unused(place, study::calc_model_hash(problem), answers); };
   const auto remove_empty_folder = [&] {
@@ -93,9 +122,12 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   };
   try {
     r = study::run_study(problem, make_factories(), options, progress, [&](const StudyState& s) {
-      answers = s.run_here;
+      answers = s.answers;
       line.say(describe_state(problem, s));
     });
+    is_finished = r.is_finished;
+    // what goes over its runs again may have met few of them: all is told that is there
+    if (!is_finished) read_what_is_there(place, problem, r);
   } catch (const InputError& e) {
     line.clear();
     const std::string& code = e.first_error().code;
@@ -136,7 +168,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   std::fprintf(out, "\n");
   write_all(out, a.output, problem, r, text, a.input, a.language);
   if (a.json) std::fputs(study::write_results_json(problem, r).c_str(), stdout);
-  if (!r.is_finished) {
+  if (!is_finished) {
     std::fprintf(stderr, "Interrupted. The same command goes on with the study.\n");
     return kRunFailed;
   }
@@ -156,6 +188,7 @@ int run_study_command(const Arguments& a, const std::atomic<bool>& cancel) {
     const StudyResult r = study::read_study(problem, store, *row);
     if (a.study.action == StudyArguments::Action::Export) {
       const std::string folder = a.output.empty() ? a.input : a.output;
+      check_target(folder, place);
       make_folder(folder);
       const nlohmann::json definition = nlohmann::json::parse(row->definition);
       write_all(stdout, folder, problem, r, definition.value("text", ""), definition.value("file", ""), a.language);

@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/unit.h"
+#include "collapse/knowledge.h"
 #include "product/document.h"
 #include "program.h"
 #include "results.h"
@@ -70,6 +71,16 @@ void check_for_plan(const std::string& file) {
                          "name the model: --evaluator \"command\"; a plan has its fuzzy values in [fuzzy]"}});
 }
 
+/// Complains of rules; `text` is then that which complaints point into.
+void check_rules(const std::string& rules, const std::string& file, std::string& text) {
+  try {
+    (void)collapse::read_knowledge(rules, file);
+  } catch (const InputError&) {
+    text = rules;
+    throw;
+  }
+}
+
 /// Where the study is to lie. Throws InputError like make_place.
 StudyPlace choose_place(const Arguments& a) {
   const fs::path folder = a.output;
@@ -124,6 +135,13 @@ double read_seconds(const std::string& text, const char* option, double fallback
     throw InputError("E801", fmt::format("{} \"{}\": {}", option, text, q.value ? "must be > 0" : q.problem),
                      "units: " + units_of(Dimension::Time));
   return *q.value;
+}
+
+void keep_runs_apart(study::Problem& p, const StudyPlace& place) {
+  json identity = json::parse(p.identity);
+  if (!study::is_server(place.store) || !identity.contains("command")) return;
+  identity["study"] = place.name;
+  p.identity = identity.dump();
 }
 
 StudyPlace make_place(const Arguments& a) {
@@ -201,7 +219,9 @@ study::Problem read_problem(const Arguments& a, std::string& text) {
     for (const Diagnostic& d : warnings) std::fputs(render(d, text, has_colour(stderr)).c_str(), stderr);
     study::PlanMappingOptions options;
     options.condensed = y.condensed;
-    p = study::make_plan_problem(plan, options, a.knowledge.empty() ? std::string() : read_file(a.knowledge));
+    const std::string rules = a.knowledge.empty() ? std::string() : read_file(a.knowledge);
+    if (!rules.empty()) check_rules(rules, a.knowledge, text);
+    p = study::make_plan_problem(plan, options, rules);
     json identity = json::parse(p.identity);
     identity["topple"] = program_version();  // other programs give other answers
     study::set_plan_identity(p, identity.dump());

@@ -17,6 +17,9 @@ struct StudyPlace {
   bool is_new = false;  // on a server, and its folder knows of none
 };
 
+/// Runs of an evaluator on a server are its study's own: the same command may be another program in another place.
+void keep_runs_apart(study::Problem&, const StudyPlace&);
+
 /// For a new study, or one to go on with; makes the folder if nothing is wrong. Throws InputError E801, E820, E822
 /// (another study is there).
 StudyPlace make_place(const Arguments&);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "commands.h"
@@ -16,21 +17,41 @@
 namespace topple::apps {
 
 int run_worker(const Arguments& a, const std::atomic<bool>& cancel) {
+  const auto complain = [&a](const InputError& e) {
+    for (const Diagnostic& d : e.diagnostics()) std::fputs(render(d, "", has_colour(stderr)).c_str(), stderr);
+    if (a.json) print_refusal(e.diagnostics());
+    return kBadInput;
+  };
   StudyPlace place;
+  bool is_for_one = false;  // of several on a server
   study::PoolOptions options;
   double idle = 0;
   try {
     place = find_place(a.input);
+    if (!a.study.name.empty()) {
+      if (!study::is_server(place.store))
+        throw InputError("E801", "--name: only a study on a server has a name", "leave it out");
+      place.name = a.study.name;
+    }
+    is_for_one = study::is_server(place.store) && !place.name.empty();
     options = make_pool_options(a.study);
     options.jobs = std::max(1, options.jobs);
     idle = read_seconds(a.study.idle, "--idle", 0);
-  } catch (const InputError& e) {
-    for (const Diagnostic& d : e.diagnostics()) std::fputs(render(d, "", has_colour(stderr)).c_str(), stderr);
-    if (a.json) print_refusal(e.diagnostics());
-    return kBadInput;
-  }
+  } catch (const InputError& e) { return complain(e); }
   try {
     study::Store store(place.store, &cancel, options.patience);
+    const auto find_study = [&] {
+      std::optional<study::StudyRow> row = store.find_study(place.name);
+      if (!row)
+        throw InputError("E820",
+                         fmt::format("there is no study \"{}\" in {}", place.name, study::hide_password(place.store)));
+      return *row;
+    };
+    // of a plan, whose condensed study has two models, any worker may take any run
+    if (is_for_one)
+      if (const study::StudyRow row = find_study();
+          nlohmann::json::parse(row.definition).at("identity").contains("command"))
+        options.model = row.model;
     const study::RunnerFactories factories = make_factories();
     study::Pool pool(place.store, factories, options);
     ProgressLine line;
@@ -52,12 +73,18 @@ int run_worker(const Arguments& a, const std::atomic<bool>& cancel) {
         why = "there was no work";
         break;
       }
+      if (is_for_one && find_study().state == "finished") {
+        why = "the study is finished";
+        break;
+      }
       if (const auto [all, open] = store.count_studies(); all > 0 && open == 0) {
         why = "every study is finished";
         break;
       }
     }
     pool.stop();
+    pool.join();
+    if (pool.has_kept()) why = "interrupted; the store is away: its runs go to others when their leases run out";
     line.clear();
     std::string others;
     if (pool.refused() > 0) others += fmt::format(", {} not understood", pool.refused());
@@ -71,7 +98,7 @@ int run_worker(const Arguments& a, const std::atomic<bool>& cancel) {
                                                       {"ending", why}})
                               .c_str());
     return kOk;
-  } catch (const study::ConnectionLost& e) {
+  } catch (const InputError& e) { return complain(e); } catch (const study::ConnectionLost& e) {
     std::fprintf(stderr, "topple: the store is away: %s\n", e.what());
     if (a.json) print_failure(std::string("the store is away: ") + e.what());
     return kRunFailed;

@@ -112,7 +112,7 @@ Confirmation judge_confirmation(const uncertainty::Space& space, const AlphaResu
           const double beyond = sign * (b.whole - bound.value);
           if (beyond > slack)
             b.state = State::Exceeded;  // whichever run does
-          else if (find(bound.sample) != nullptr)
+          else if (const Confirmation::Run* run = find(bound.sample); run && run->whole.state == Result::State::Done)
             b.state = beyond < -slack ? State::NotReached : State::Confirmed;
         }
         out.bounds.push_back(b);

@@ -109,6 +109,7 @@ std::string make_study_definition(const Problem& p, const StudyOptions& options)
          {"permissible", p.permissible},
          {"drivers", p.has_drivers}};
   if (p.whole) d["confirm"] = p.confirm;
+  if (!options.directory.empty()) d["directory"] = options.directory;
   return d.dump();
 }
 
@@ -162,6 +163,13 @@ std::vector<std::string> list_failures(const uncertainty::Archive& archive) {
   std::vector<std::string> lines;
   for (const auto& [text, count] : sorted) lines.push_back(fmt::format("{} x {}", count, text));
   return lines;
+}
+
+/// Why whole runs failed.
+void add_failures(const Confirmation& c, std::vector<std::string>& lines) {
+  for (const Confirmation::Run& run : c.runs)
+    if (run.whole.state == Result::State::Failed)
+      lines.push_back(fmt::format("the whole run beside number {}: {}", run.sample, run.whole.text));
 }
 
 /// Whether a search for an outcome that was found with an input known has not come to its end.
@@ -269,6 +277,10 @@ class Manager {
       store_.add_jobs(asked_model_, jobs);
       pool_->wake();
       arrived_ = static_cast<long>(batch.size() - jobs.size());  // were there before
+      failed_arrived_ = std::ranges::count_if(hashes, [this](const std::string& hash) {
+        const auto found = known_.find(hash);
+        return found != known_.end() && found->second.kind != Answer::Kind::Done;
+      });
       wait_for(open);
     }
     for (std::size_t i = 0; i < batch.size(); ++i) {
@@ -284,7 +296,7 @@ class Manager {
       ++asked_;
       failed_ += out[i].state == Result::State::Failed;
     }
-    open_ = arrived_ = 0;
+    open_ = arrived_ = failed_arrived_ = 0;
     show(false);
   }
 
@@ -403,7 +415,11 @@ class Manager {
     return r;
   }
 
-  /// A study that was finished before a command that is refused stays finished: all that it found is there.
+  /// Whether anything new was run.
+  bool has_run() const { return run_here_ > 0; }
+
+  /// A study that was finished before a command that is refused, or that ended before anything new was run, stays
+  /// finished: all that it found is there.
   void keep_finished() {
     pool_.reset();
     if (finished_) store_.put_study(*finished_);
@@ -540,7 +556,9 @@ class Manager {
       runs.emplace_back().sample = sample;
       points.push_back(r.alpha.archive[sample].x);
     }
-    limit_ = static_cast<int>(asked_) + static_cast<int>(points.size());
+    limit_ = static_cast<int>(points.size());
+    before_ = {asked_, failed_, run_here_};
+    start_ = Clock::now();
     is_confirming_ = true;
     show(true);
     std::vector<Result> results(points.size());
@@ -548,6 +566,7 @@ class Manager {
     is_confirming_ = false;
     for (std::size_t i = 0; i < runs.size(); ++i) runs[i].whole = std::move(results[i]);
     r.confirmation = judge_confirmation(problem_.space, r.alpha, std::move(runs), problem_.confirm);
+    add_failures(r.confirmation, r.failures);
     r.outcomes = names_.outcomes;
   }
 
@@ -608,6 +627,7 @@ class Manager {
       pool_->check();
       std::vector<StoredResult> found = store_.find_results(open);
       for (const StoredResult& r : found) check_request(r.answer);
+      for (const StoredResult& r : found) failed_arrived_ += r.answer.kind != Answer::Kind::Done;
       for (StoredResult& r : found) known_.emplace(std::move(r.hash), std::move(r.answer));
       if (!found.empty()) {
         std::erase_if(open, [this](const std::string& hash) { return known_.contains(hash); });
@@ -644,8 +664,10 @@ class Manager {
     if (!is_last && std::chrono::duration<double>(now - shown_).count() < 0.2) return;
     shown_ = now;
     StudyState s;
-    s.done = asked_ + arrived_, s.failed = failed_, s.open = open_, s.running = std::min(running_, open_);
-    s.run_here = run_here_, s.limit = limit_, s.is_confirming = is_confirming_;
+    s.done = asked_ + arrived_ - before_.asked, s.failed = failed_ + failed_arrived_ - before_.failed, s.open = open_,
+    s.running = std::min(running_, open_);
+    s.run_here = run_here_ - before_.run_here, s.answers = run_here_;
+    s.limit = limit_, s.is_confirming = is_confirming_;
     s.seconds = std::chrono::duration<double>(now - start_).count();
     s.so_far = result_.outputs.empty() && result_.outcomes.empty() ? nullptr : &result_;
     watch_(s);
@@ -666,7 +688,10 @@ class Manager {
   Names names_;
   StudyResult result_;  // so far
   long asked_ = 0, failed_ = 0, open_ = 0, running_ = 0, run_here_ = 0;
-  long arrived_ = 0;  // of the batch that is being run
+  struct {
+    long asked = 0, failed = 0, run_here = 0;
+  } before_;                               // whole runs, which have a rate of their own
+  long arrived_ = 0, failed_arrived_ = 0;  // of the batch that is being run
   int limit_ = 0;
   bool is_confirming_ = false, is_request_checked_ = false;
   Clock::time_point start_ = Clock::now(), shown_ = start_;
@@ -694,7 +719,9 @@ StudyResult run_study(const Problem& problem, const RunnerFactories& factories, 
   uncertainty::check_space(problem.space);
   Manager manager(problem, factories, options, progress, watch);
   try {
-    return manager.run();
+    StudyResult r = manager.run();
+    if (!r.is_finished && !manager.has_run()) manager.keep_finished();
+    return r;
   } catch (const InputError&) {
     manager.keep_finished();
     throw;
@@ -778,6 +805,7 @@ StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row
       if (const auto found = answers.find(hashes[i]); found != answers.end())
         runs[i].whole = names.translate(found->second);
     r.confirmation = judge_confirmation(problem.space, r.alpha, std::move(runs), problem.confirm);
+    add_failures(r.confirmation, r.failures);
     r.outcomes = names.outcomes;
   }
   if (r.is_finished) r.ending = uncertainty::Ending::Complete;

@@ -24,6 +24,7 @@ struct StudyOptions {
   std::string source_name;
   PoolOptions pool;  // own workers; no jobs: only those of other processes
   bool rerun_failed = false;
+  std::string directory;           // where a command is looked for; empty: the model is none
   bool is_new = false;             // a study of this name in the store must be the same one
   std::function<void()> accepted;  // called once the store holds the study, before anything is run; may be empty
 };
@@ -32,8 +33,9 @@ struct StudyOptions {
 struct StudyState {
   long done = 0, failed = 0;                   // points answered, of those asked for so far; done includes failed
   long running = 0, open = 0;                  // asked for, not answered; of them under way
-  long run_here = 0;                           // answers since this start
-  double seconds = 0;                          // since this start
+  long run_here = 0;                           // answers since this start, or that of the whole runs
+  long answers = 0;                            // since this start
+  double seconds = 0;                          // in which those of `run_here` came
   int limit = 0;                               // of points
   bool is_confirming = false;                  // whole runs are under way
   const struct StudyResult* so_far = nullptr;  // names and bounds; nullptr before the first

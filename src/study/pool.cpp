@@ -40,7 +40,12 @@ Pool::Pool(std::string address, const RunnerFactories& factories, const PoolOpti
 
 Pool::~Pool() {
   stop();
-  for (std::thread& t : threads_) t.join();
+  join();
+}
+
+void Pool::join() {
+  for (std::thread& t : threads_)
+    if (t.joinable()) t.join();
 }
 
 void Pool::stop() {
@@ -193,7 +198,7 @@ void Pool::run_jobs(Store& store, const std::string& name, std::vector<Job> jobs
       for (std::size_t i = 0; i < jobs.size(); ++i)
         if (!is_given[i]) store.finish(jobs[i], name, {});
     } catch (const std::exception&) {
-      // the first failure is the one to tell; leases run out
+      has_kept_ = true;  // the first failure is the one to tell
     }
     std::rethrow_exception(failure);
   }

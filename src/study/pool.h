@@ -31,6 +31,10 @@ class Pool {
   Pool& operator=(const Pool&) = delete;
 
   void stop();
+  /// Until all have ended, behind `stop`.
+  void join();
+  /// Whether runs under way could not be given back: they go to others when their leases run out.
+  bool has_kept() const { return has_kept_; }
   /// There may be jobs.
   void wake();
   /// Until a job was finished here after the last call, or so long.
@@ -61,7 +65,7 @@ class Pool {
   const RunnerFactories& factories_;
   PoolOptions options_;
   std::vector<std::string> names_;
-  std::atomic<bool> stop_ = false;
+  std::atomic<bool> stop_ = false, has_kept_ = false;
   std::atomic<bool> has_suspect_ = false;  // a thread holds one, or may be about to
   std::atomic<int> running_ = 0;
   std::atomic<long> finished_ = 0, too_late_ = 0, refused_ = 0, news_count_ = 0;

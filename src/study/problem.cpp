@@ -38,7 +38,10 @@ std::vector<std::string> make_short_names(const std::vector<Quantity>& list) {
     const auto is_taken = [&](const Quantity& other) {
       return other.name != q.name && shorten(other.name, parts) == shorten(q.name, parts);
     };
-    while (shorten(q.name, parts) != q.name && std::any_of(list.begin(), list.end(), is_taken)) ++parts;
+    // a number alone is a place in a list
+    const auto is_number = [&] { return shorten(q.name, parts).find_first_not_of("0123456789") == std::string::npos; };
+    while (shorten(q.name, parts) != q.name && (is_number() || std::any_of(list.begin(), list.end(), is_taken)))
+      ++parts;
     names.push_back(shorten(q.name, parts));
   }
   return names;

@@ -178,6 +178,7 @@ json confirmation_json(const Problem& p, const StudyResult& r) {
                     {"whole_outcome", run.whole.state == Result::State::NotRun
                                           ? json(nullptr)
                                           : json(name_of_outcome(r, uncertainty::outcome_of(run.whole)))},
+                    {"whole_failure", run.whole.state == Result::State::Failed ? json(run.whole.text) : json(nullptr)},
                     {"values", values(condensed)},
                     {"whole_values", values(run.whole)}});
   }

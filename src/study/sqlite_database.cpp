@@ -95,8 +95,13 @@ class SqliteDatabase final : public Database {
         access(path_.c_str(), W_OK) == 0 && access(folder.empty() ? "." : folder.c_str(), W_OK) == 0;
     if (is_writable) {
       open(path_, SQLITE_OPEN_READWRITE);
-      if (!holds_studies()) refuse("it has no table of studies");
-      return;
+      try {
+        if (!holds_studies()) refuse("it has no table of studies");
+        return;
+      } catch (const DiskFailed&) {
+        // no room for what they agree by
+        close();
+      }
     }
     open(path_, SQLITE_OPEN_READONLY);
     try {

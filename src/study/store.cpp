@@ -531,7 +531,12 @@ Counts Store::count(const std::string& model) {
   return transact(
       [&](bool) {
         Counts c;
-        for (const Row& r : db_->run("SELECT state, count(*) FROM job WHERE model = $1 GROUP BY state", {model})) {
+        // a lease that has run out is of a worker that is gone: its run waits
+        for (const Row& r : db_->run(fmt::format("SELECT s, count(*) FROM (SELECT CASE WHEN state = 'running' AND "
+                                                 "lease_until < {} THEN 'waiting' ELSE state END AS s FROM job WHERE "
+                                                 "model = $1) AS j GROUP BY s",
+                                                 db_->dialect().now),
+                                     {model})) {
           const long n = std::stol(*r[1]);
           if (*r[0] == "waiting" || *r[0] == "refused") c.waiting += n;
           if (*r[0] == "running") c.running = n;
@@ -546,7 +551,11 @@ Counts Store::count(const std::string& model) {
 long Store::count_running(const std::string& model) {
   return transact(
       [&](bool) {
-        return std::stol(*db_->run("SELECT count(*) FROM job WHERE state = 'running' AND model = $1", {model})[0][0]);
+        // a lease that has run out is of a worker that is gone
+        return std::stol(*db_->run(fmt::format("SELECT count(*) FROM job WHERE state = 'running' AND model = $1 AND "
+                                               "lease_until >= {}",
+                                               db_->dialect().now),
+                                   {model})[0][0]);
       },
       true);
 }

@@ -297,6 +297,76 @@ TEST_F(StudyFaults, LeaveACondensedStudyOfAPlanAsItWouldBe) {
   EXPECT_NE(read(folder / "log").find("E822"), std::string::npos);
 }
 
+TEST_F(StudyFaults, OfOneCommandInTwoPlacesShareNoRunsOnAServer) {
+  const auto server = Server::make();
+  if (!server) GTEST_SKIP() << "PostgreSQL is not installed";
+  const auto in = [&](const std::string& place, const std::string& words) {
+    return std::vector<std::string>{"/bin/sh", "-c",
+                                    "cd '" + (folder / place) + "' && exec " + TOPPLE_PROGRAM + " " + words};
+  };
+  const auto study_of = [&](const std::string& out, const std::string& more = "") {
+    return "study inputs.toml --evaluator ./model -o " + out + " --store " + server->url() + " --samples 150 " + more;
+  };
+  for (const std::string place : {"a", "b"}) {
+    std::filesystem::create_directory(folder / place);
+    write_inputs(folder / place + "/inputs.toml", cases::make_jump_inputs());
+    const std::string model = folder / place + "/model";
+    std::ofstream(model) << "#!/bin/sh\n"
+                         << TOPPLE_STUDY_MODEL << " jump" << (place == "b" ? " | sed -u s/falls/lies/" : "") << "\n";
+    std::filesystem::permissions(model, std::filesystem::perms::owner_all);
+  }
+  ASSERT_EQ(run(in("a", study_of("of-a"))), 0) << read(folder / "log");
+  ASSERT_EQ(run(in("b", study_of("of-b"))), 0) << read(folder / "log");
+  const auto has = [&](const std::string& out, const char* outcome) {
+    return read(folder / out + "/results.json").find(outcome) != std::string::npos;
+  };
+  EXPECT_TRUE(has("a/of-a", "\"falls\"") && !has("a/of-a", "\"lies\""));
+  EXPECT_TRUE(has("b/of-b", "\"lies\"") && !has("b/of-b", "\"falls\""));
+  // nor does a new folder in the other place go on with a study that has the same name, inputs and command
+  EXPECT_EQ(run(in("b", study_of("again", "--name of-a"))), 2);
+  EXPECT_NE(read(folder / "log").find("holds another study \"of-a\""), std::string::npos) << read(folder / "log");
+  EXPECT_EQ(run(in("a", study_of("again", "--name of-a"))), 0) << read(folder / "log");
+  expect_same("a/of-a", "a/again");
+
+  // a worker of one study leaves those of others alone
+  const pid_t other = start(in("a", study_of("open-a", "--jobs 0"))),
+              own = start(in("b", study_of("open-b", "--jobs 0")));
+  const auto db = open_database(server->url());
+  wait_until([&] { return number(*db, "SELECT count(*) FROM study WHERE name IN ('open-a', 'open-b')") == 2; });
+  EXPECT_EQ(run(in("b", "worker " + server->url() + " --name open-b --jobs 1")), 0);
+  EXPECT_EQ(wait_for(own), 0) << read(folder / "log");
+  EXPECT_TRUE(has("b/open-b", "\"lies\"") && !has("b/open-b", "\"falls\""));
+  EXPECT_EQ(number(*db, "SELECT count(*) FROM result r JOIN study s ON s.model = r.model WHERE s.name = 'open-a'"), 0);
+  kill(other, SIGINT);
+  EXPECT_EQ(wait_for(other), 1);
+  EXPECT_EQ(run({TOPPLE_PROGRAM, "worker", server->url(), "--name", "none"}), 2);
+  EXPECT_NE(read(folder / "log").find("there is no study \"none\""), std::string::npos);
+}
+
+TEST_F(StudyFaults, LeaveAFinishedStudyWhereItsRepetitionIsInterrupted) {
+  write_inputs(folder / "in.toml", cases::make_jump_inputs());
+  const auto words = study("out", "jump", {"--batch", "50", "--samples", "6000", "--permissible", "stands"});
+  ASSERT_EQ(run(words), 0) << read(folder / "log");
+  std::filesystem::copy(folder / "out", folder / "before", std::filesystem::copy_options::recursive);
+  const auto db = open_database(folder / "out/study.sqlite");
+  for (const int wait : {50, 150, 300}) {
+    const pid_t again = start(words);
+    std::this_thread::sleep_for(std::chrono::milliseconds(wait));
+    kill(again, SIGINT);
+    const int ending = wait_for(again);
+    EXPECT_TRUE(ending == 0 || ending == 1) << ending;
+    expect_same("out", "before");
+    EXPECT_EQ(read(folder / "out/boxes.csv"), read(folder / "before/boxes.csv"));
+    EXPECT_EQ(number(*db, "SELECT count(*) FROM study WHERE state = 'finished'"), 1);
+  }
+  // what is exported replaces nothing of another study
+  EXPECT_EQ(run(study("other", "jump", {"--samples", "50"})), 0);
+  EXPECT_EQ(run({TOPPLE_PROGRAM, "study", "export", folder / "other", "-o", folder / "out"}), 2);
+  EXPECT_NE(read(folder / "log").find("holds another study, whose files these would replace"), std::string::npos);
+  expect_same("out", "before");
+  EXPECT_EQ(run({TOPPLE_PROGRAM, "study", "export", folder / "other", "-o", folder / "tables"}), 0);
+}
+
 TEST_F(StudyFaults, DoNotMixBuilds) {
   std::ofstream(folder / "plan.toml") << collapse::house(
       collapse::charge("C-A*-0") +
