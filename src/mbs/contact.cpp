@@ -142,7 +142,10 @@ Earnings System::calc_energies(const ContactGroup& g, double h) const {
   const size_t W = kernel::lanes();
   const auto speed_of = [&](int touched) {  // none of what is fixed
     const size_t body = static_cast<size_t>(s.touching.body[static_cast<size_t>(touched)]);
-    return body == B ? std::pair<Vec3, Vec3>{} : std::pair<Vec3, Vec3>{s.v[body], s.w[body]};
+    if (body == B) return std::pair<Vec3, Vec3>{};
+    // the spin of the step that has led here, as it began: the inertia has turned since
+    const Vec3 w = s.w[body];
+    return std::pair<Vec3, Vec3>{s.v[body], w + h * (calc_world_inverse_inertia(body) * cross(w, s.L[body]))};
   };
   const auto [v_a, w_a] = speed_of(g.a);
   const auto [v_b, w_b] = speed_of(g.b);

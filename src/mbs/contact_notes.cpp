@@ -144,6 +144,7 @@ void System::note_overlaps_at_start() {
       } else if (shape.kind == Shape::Kind::Sphere) {
         reach = shape.radius;
       } else if (const Hull* hull = hull_of(i)) {
+        reach = -kUnlimited;  // it may lie beside the origin of its frame
         for (const Vec3& v : hull->vertices) reach = std::max(reach, dot(down, v));
       }
       const double depth = model.contact.offset - dot(model.contact.normal, Vec3{s.p[b]} + R * shape.p_BS) + reach;

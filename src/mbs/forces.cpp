@@ -235,6 +235,12 @@ void System::evaluate_springs(bool at_rest) {
       continue;
     }
     move_to(s.component, x, s.has_been_evaluated);
+    if (s.has_been_evaluated && dot(s.along, row.line) < 0) {
+      // it went through its anchor: what it pulled before pushes along the line of now
+      s.component.before = -s.component.before - 2 * k.free_length;
+      s.component.damper = -s.component.damper;
+    }
+    s.along = row.line;
     s.component.spring = f;
     s.energy = calc_integral(k.spring, x);
     s.has_been_evaluated = true;

@@ -72,6 +72,7 @@ struct SpringState {
   bool has_been_evaluated = false;
   double energy = 0, plastic = 0, damping = 0;  // stored, dissipated by breaking, by the damper [J]
   ComponentState component;
+  Vec3 along;  // of the evaluation before, in W
 };
 
 struct BushingState {

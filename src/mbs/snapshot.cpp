@@ -58,7 +58,7 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(sys.ground_reaction), ar(sys.ground_contact), ar(sys.body_contacts);
 }
 
-constexpr std::uint64_t kMagic = 0x45534e41504f54ULL;  // "TOPANSE"
+constexpr std::uint64_t kMagic = 0x46534e41504f54ULL;  // "TOPANSF"
 
 /// What of the system's scratch the next step takes over, under the same names.
 struct Carried {

@@ -455,5 +455,23 @@ TEST(BodyContact, NotesBodiesThatMayPassBetweenTwoLooks) {
   EXPECT_TRUE(note_lost_contacts(m, 0.002, 5e-5).empty());
 }
 
+TEST(OverlapNotes, AHullThatLiesAboveItsOriginReachesNotDownToIt) {
+  Model m;
+  m.gravity = {};
+  Body b = make_box("b", 1, {0.1, 0.1, 0.1}, {0, 0, -1});
+  Shape hull;
+  hull.kind = Shape::Kind::Hull;
+  hull.vertices = {{0.1, 0, 1.02}, {-0.1, 0.1, 1.02}, {-0.1, -0.1, 1.02}, {0, 0, 1.2}};
+  b.shapes = {hull};
+  add_body(m, b);
+  Options o;
+  o.equilibrium = false;
+  o.duration = 0.01;
+  o.tells_lost_contact = true;
+  EXPECT_TRUE(run(m, o).notes.empty());
+  m.bodies[0].X_WB.p.z = -1.15;
+  EXPECT_FALSE(run(m, o).notes.empty());
+}
+
 }  // namespace
 }  // namespace topple::mbs
