@@ -115,7 +115,7 @@ void print_outputs(std::FILE* out, const Problem& p, const StudyResult& r) {
       const auto& l = r.alpha.outputs[o].levels[k];
       const auto bound = [unit, digits](const uncertainty::Bound& b) {
         return b.sample < 0 ? std::string("-")
-                            : fmt::format("{:.{}g}{}", b.value / unit, digits, b.converged ? "" : "*");
+                            : fmt::format("{:.{}g}{}", b.value / unit + 0.0, digits, b.converged ? "" : "*");
       };
       line += fmt::format("  {:>10} to {:<9}", bound(l.lower), bound(l.upper));
       has_gap = has_gap || l.lower.sample < 0;

@@ -526,7 +526,7 @@ void Builder::finish_bodies() {
   for (const Assembly& a : assemblies)
     for (const Part& p : a.parts)
       if (p.member >= 0 && p.is_solid) volume_per_mass[p.member] += p.mass;
-  for (auto& [index, mass] : volume_per_mass) mass = calc_volume(plan, member(index)) / mass;
+  for (auto& [index, mass] : volume_per_mass) mass = mass > 0 ? calc_volume(plan, member(index)) / mass : 0;
   for (const Assembly& a : assemblies) {
     if (!(a.mass() > 0)) {
       complain_of_joint(a);

@@ -119,6 +119,16 @@ double calc_away(const BlockFrame& block, const Knowledge& k) {
   return std::isfinite(down + aside) ? std::max(down, aside) : std::numeric_limits<double>::quiet_NaN();
 }
 
+double find_deciding_touchdown(const std::vector<BlockFrame>& frames, const std::vector<double>& touchdowns,
+                               const Knowledge& k) {
+  for (const double time : touchdowns) {
+    BlockFrame at = find_block(frames, time);
+    if (at.connected < k.mechanism_coherent_share) at.displacement = at.pieces.displacement;
+    if (!(-at.displacement.z < k.stands_displacement)) return time;
+  }
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
 Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   constexpr double pi = 3.14159265358979323846;
   Mechanism out;
@@ -137,7 +147,8 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   const Vec3 turned = log_rotation(whole.rotation);
   Vec3 direction = in.fall_direction;
   const Vec3 lean = cross({turned.x, turned.y, 0}, {0, 0, 1});
-  if (norm(lean) > 1e-3) direction = (1 / norm(lean)) * lean;
+  const bool leans = norm(lean) > 1e-3;
+  if (leans) direction = (1 / norm(lean)) * lean;
   out.tilt = norm(Vec3{turned.x, turned.y, 0});
   const Mat3 R = to_matrix(whole.rotation);
   const auto drop_of = [&](const Vec3& arm) { return -(whole.displacement + R * arm - arm).z; };
@@ -157,9 +168,12 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   double off = std::atan2(direction.y, direction.x) - std::atan2(in.fall_direction.y, in.fall_direction.x);
   off = std::remainder(off, 2 * pi);
 
-  const std::string when = touched ? fmt::format("when the upper block first touches the ground, at {:.2f} s", out.time)
-                           : in.is_under_way ? fmt::format("so far, at {:.2f} s", out.time)
-                                             : fmt::format("at the end, {:.2f} s", out.time);
+  const std::string when =
+      touched           ? in.is_later_touchdown
+                              ? fmt::format("when the upper block has come down and touches the ground, at {:.2f} s", out.time)
+                              : fmt::format("when the upper block first touches the ground, at {:.2f} s", out.time)
+                : in.is_under_way ? fmt::format("so far, at {:.2f} s", out.time)
+                        : fmt::format("at the end, {:.2f} s", out.time);
   const std::string motion = fmt::format(
       "{}, it leans by {:.1f} deg, its mass centre has come down by {:.2f} m, and its rear edge {:.0f} % as far as its "
       "front edge. {} {:.0f} % of the mass has come down",
@@ -240,7 +254,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
         100 * out.foot_share);
   out.is_final =
       in.came_to_rest || sways_less || (touched && out.moved >= k.mechanism_partial_share && height_left <= 0.5);
-  out.is_azimuth_of_lean = out.name == "topple" || out.name == "wrong direction";
+  out.is_azimuth_of_lean = leans && (out.name == "topple" || out.name == "wrong direction");
   const Vec3& way = out.is_azimuth_of_lean ? direction : out.run;
   const bool has_way = out.is_azimuth_of_lean || norm(out.run) >= kLeastRun;
   out.azimuth = has_way ? std::atan2(way.y, way.x) : std::numeric_limits<double>::quiet_NaN();

@@ -41,9 +41,10 @@ struct BlockFrame {
 
 struct MechanismInput {
   std::vector<BlockFrame> frames;
-  double last_charge = 0;         // [s]
-  double touchdown = 0;           // first touchdown of an upper body; NaN if there was none [s]
-  Vec3 fall_direction{-1, 0, 0};  // planned, or expected
+  double last_charge = 0;           // [s]
+  double touchdown = 0;             // that decides (find_deciding_touchdown); NaN if there was none [s]
+  bool is_later_touchdown = false;  // others were before it
+  Vec3 fall_direction{-1, 0, 0};    // planned, or expected
   bool is_direction_planned = false;
   std::optional<double> direction_tolerance;  // [rad]; not given: the rule's
   Polygon outline;                            // of the upper block seen from above, from its mass centre; convex [m]
@@ -64,7 +65,7 @@ struct Fall {
 struct Mechanism {
   std::string name;       // "topple", "fold", "vertical", "progressive", "partial", "wrong direction", "stands"
   std::string text;       // a sentence with its numbers
-  double time = 0;        // of judgement: first touchdown of the upper block, else the end [s]
+  double time = 0;        // of judgement: the touchdown that decides, else the end [s]
   double tilt = 0;        // then, towards the direction [rad]
   double rear_share = 0;  // then, drop of the rear edge over that of the front edge
   double foot_share = 0;  // the same at the block's underside, which rotation about a foot does not bring down
@@ -87,6 +88,11 @@ double calc_tilt(const Quat& rotation, const Vec3& fall_direction);
 /// How far the block is from its place: below 1 it stands. Of its way down over stands.displacement, and its way to a
 /// side over that or, if more, over stands.drift of its height, the larger; NaN if it is nowhere.
 double calc_away(const BlockFrame&, const Knowledge&);
+
+/// The first touchdown of an upper body at which the block, or all of it where it is in pieces, has come down by
+/// stands.displacement: what falls off a building that still stands does not decide. NaN: none.
+///   touchdowns  rising [s]
+double find_deciding_touchdown(const std::vector<BlockFrame>&, const std::vector<double>& touchdowns, const Knowledge&);
 
 /// Judges frames; there is at least one.
 Mechanism judge_mechanism(const MechanismInput&, const Knowledge&);

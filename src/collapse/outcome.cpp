@@ -30,7 +30,7 @@ namespace {
 
 /// Of each structure.
 std::vector<MechanismInput> make_mechanism_inputs(const product::Plan& plan, const mbs::Model& model,
-                                                  const ModelMap& map, const Recorder& recorder,
+                                                  const ModelMap& map, const Knowledge& k, const Recorder& recorder,
                                                   const mbs::Summary& summary, bool is_under_way, bool is_cancelled) {
   MechanismInput in;
   in.fall_direction = map.fall_direction;
@@ -63,7 +63,9 @@ std::vector<MechanismInput> make_mechanism_inputs(const product::Plan& plan, con
   std::vector<MechanismInput> out;
   for (size_t s = 0; s < S; ++s) {
     in.frames = recorder.block_frames(s);
-    in.touchdown = recorder.first_touchdown(s);
+    const std::vector<double> touchdowns = recorder.upper_touchdowns(s);
+    in.touchdown = find_deciding_touchdown(in.frames, touchdowns, k);
+    in.is_later_touchdown = !touchdowns.empty() && in.touchdown > touchdowns.front();
     if (mass[s] > 0) centre[s] = (1 / mass[s]) * centre[s];
     for (Point2& p : corners[s]) p = {p[0] - centre[s].x, p[1] - centre[s].y};
     in.outline = calc_hull(std::move(corners[s]));
@@ -80,7 +82,7 @@ std::vector<Mechanism> judge_structures(const product::Plan& plan, const mbs::Mo
                                         bool is_under_way, bool is_cancelled) {
   std::vector<Mechanism> verdicts;
   for (const MechanismInput& in :
-       make_mechanism_inputs(plan, model, map, recorder, summary, is_under_way, is_cancelled))
+       make_mechanism_inputs(plan, model, map, k, recorder, summary, is_under_way, is_cancelled))
     verdicts.push_back(judge_mechanism(in, k));
   return verdicts;
 }
@@ -101,7 +103,8 @@ Mechanism judge_run(const std::vector<Mechanism>& verdicts, const ModelMap& map,
 
 std::vector<NearVerdict> find_near_verdicts(const product::Plan& plan, const mbs::Model& model, const ModelMap& map,
                                             const Knowledge& k, const Recorder& recorder, const mbs::Summary& summary) {
-  const std::vector<MechanismInput> inputs = make_mechanism_inputs(plan, model, map, recorder, summary, false, false);
+  const std::vector<MechanismInput> inputs =
+      make_mechanism_inputs(plan, model, map, k, recorder, summary, false, false);
   return inputs.size() == 1 ? find_near_verdicts(inputs.front(), k) : std::vector<NearVerdict>{};
 }
 

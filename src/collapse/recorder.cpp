@@ -295,13 +295,14 @@ std::vector<BlockFrame> Recorder::farthest_block_frames(const std::vector<bool>&
   return out;
 }
 
-double Recorder::first_touchdown(size_t structure) const {
-  double first = std::numeric_limits<double>::quiet_NaN();
+std::vector<double> Recorder::upper_touchdowns(size_t structure) const {
+  std::vector<double> times;
   for (const Touchdown& t : touchdowns_) {
     const BodyEntry& body = map_.bodies[static_cast<size_t>(t.body)];
-    if (body.is_upper && body.structure == static_cast<int>(structure)) first = std::fmin(first, t.time);
+    if (body.is_upper && body.structure == static_cast<int>(structure)) times.push_back(t.time);
   }
-  return first;
+  std::sort(times.begin(), times.end());
+  return times;
 }
 
 void Recorder::put_pose(const Pose& X) {

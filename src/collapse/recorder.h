@@ -69,8 +69,8 @@ class Recorder {
   ///   counts  which structures are looked at, one at least; empty: all (structures)
   std::vector<BlockFrame> farthest_block_frames(const std::vector<bool>& counts = {}) const;
   const std::vector<ZoneFrame>& zone_frames() const { return zone_frames_; }
-  double first_touchdown() const { return first_.time; }  // of an upper body; NaN if none [s]
-  double first_touchdown(size_t structure) const;         // of an upper body of it
+  double first_touchdown() const { return first_.time; }         // of an upper body; NaN if none [s]
+  std::vector<double> upper_touchdowns(size_t structure) const;  // of its upper bodies, rising [s]
   std::string first_touchdown_body() const {
     return first_.body < 0 ? std::string() : map_.bodies[static_cast<size_t>(first_.body)].name;
   }

@@ -41,7 +41,9 @@ Marks count_marks(const Problem& p, const StudyResult& r) {
           if (b.sample >= 0) add(b.converged);
   };
   add_bounds(r.alpha.outputs);
-  for (const auto& c : r.alpha.classes) add_bounds(c.outputs);
+  // bounds of a class that alone has numbers are those of all runs
+  if (count_outcomes(r.alpha) > 1)
+    for (const auto& c : r.alpha.classes) add_bounds(c.outputs);
   for (const auto& c : r.possibilities.classes) add(c.converged);
   if (!is_of_outcomes(p))
     for (const auto& c : r.requirement)
@@ -416,6 +418,7 @@ std::string words_of_possibility(double degree) {
 }
 
 std::string words_of_number(double value, double width) {
+  value += 0.0;  // no "-0"
   // a thousandth of the width
   if (width > 0 && value != 0) {
     const int digits = static_cast<int>(std::floor(std::log10(std::abs(value))) - std::floor(std::log10(width))) + 4;

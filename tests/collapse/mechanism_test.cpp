@@ -112,6 +112,30 @@ TEST(Mechanism, WhatBreaksOnTheGroundIsJudgedAsItCameDown) {
   EXPECT_NEAR(m.drop, 2 * in.touchdown, 1e-9);
 }
 
+TEST(Mechanism, WhatFallsOffABuildingThatStandsDoesNotDecide) {
+  // it stands for a second, in which an annex lands, and then turns over towards -x
+  MechanismInput in = synthetic(0.2, 0, 1);
+  const BlockFrame start = in.frames.front();
+  for (BlockFrame& f : in.frames) f.time += 1;
+  in.frames.insert(in.frames.begin(), start);
+  const auto find = [&in](std::vector<double> times) {
+    return find_deciding_touchdown(in.frames, times, default_knowledge());
+  };
+  EXPECT_EQ(find({0.5, 0.9, 2.0, 2.1}), 2.0);
+  EXPECT_TRUE(std::isnan(find({0.5, 0.9})));
+  EXPECT_TRUE(std::isnan(find({})));
+  in.touchdown = 2, in.is_later_touchdown = true;
+  EXPECT_THAT(judge_mechanism(in, default_knowledge()).text,
+              testing::HasSubstr("when the upper block has come down and touches the ground, at 2.00 s"));
+  // at the annex the lean is none, and so no direction of a fall
+  in.touchdown = 0.5;
+  EXPECT_FALSE(judge_mechanism(in, default_knowledge()).is_azimuth_of_lean);
+  // in pieces all of it counts
+  for (BlockFrame& f : in.frames) take_apart(f, 0.4);
+  in.frames[0].pieces.displacement = in.frames[1].pieces.displacement = {0, 0, -1};
+  EXPECT_EQ(find({0.5, 0.9}), 0.5);
+}
+
 TEST(Mechanism, FoldsAboutEitherAxis) {
   MechanismInput in = synthetic(0.1, 1, 1);
   EXPECT_NE(name_of(in), "fold");
