@@ -306,6 +306,16 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
 std::string LiveModel::remove_charge(const Edit& e, double time) {
   LiveCharge& c = unfired(e.charge, time);
   c.is_removed = true;
+  if (const Member& m = plan_.members[static_cast<size_t>(charge(c).member)]; m.kind == MemberKind::Shaft) {
+    // what was said of its mouths, and of the block above them, holds for all its charges
+    const std::string title = "The mouth of " + m.name;
+    std::erase_if(map_.notes, [&](const ModelNote& note) { return note.title == title; });
+    std::erase_if(map_.ground_columns, [&](const GroundColumn& g) { return g.member == m.name; });
+    map_.notes.push_back(
+        {title, fmt::format("The mouth of {}: a charge is taken out, and what it leaves of the ring is "
+                            "not known here; apply the edits to the plan to have it anew.",
+                            m.name)});
+  }
   return fmt::format("the charge on {} at {} is taken out", member_of(c), words_of_time(c.time));
 }
 

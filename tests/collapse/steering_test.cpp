@@ -19,6 +19,7 @@
 #include "collapse/edit_json.h"
 #include "collapse/run.h"
 #include "plans.h"
+#include "product/templates.h"
 
 namespace topple::collapse {
 namespace {
@@ -657,6 +658,22 @@ TEST(Steering, ReportsTellThePlanAndTheEditsApart) {
   ASSERT_EQ(edits.size(), 2U);
   EXPECT_THAT(edits[0], StartsWith("Edit at 0 s: the charge on C-A1-0"));
   EXPECT_THAT(edits[1], HasSubstr("0.33"));
+}
+
+TEST(Steering, ForgetsWhatWasSaidOfAMouthWhoseChargeIsTakenOut) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(read(product::find_template("tower").text), "main")));
+  const auto words = [&s] {
+    std::string all;
+    for (const record::Finding& f : s.make_record(s.active()).findings) all += f.text + "\n";
+    return all;
+  };
+  advance_until(s, 0.05);
+  EXPECT_THAT(words(), HasSubstr(" deg of the ring. The weight of "));
+  s.edit(read_edit(Json::parse(R"({"command": "remove_charge", "charge": 0})")));
+  advance_until(s, 0.1);
+  EXPECT_THAT(words(), HasSubstr("a charge is taken out, and what it leaves of the ring is not known here"));
+  EXPECT_THAT(words(), Not(HasSubstr(" deg of the ring. The weight of ")));
 }
 
 TEST(Steering, RefusedEditsChangeNothing) {

@@ -257,6 +257,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["removed", "entfernt"],
   ["reaction", "Auflagerkraft"],
   ["The floor load above storey {} is left out: there is no slab to carry it.", "Die Deckenlast über Geschoss {} bleibt weg: Keine Decke trägt sie."],
+  ["The mouth of {}: a charge is taken out, and what it leaves of the ring is not known here; apply the edits to the plan to have it anew.", "Das Sprengmaul von {}: Eine Ladung ist herausgenommen, und was es vom Ring stehen lässt, ist hier nicht bekannt; wenden Sie die Änderungen auf den Plan an, um es neu zu erhalten."],
   ["The mouth of {} at {:.1f} m leaves {:.0f} deg of the ring. The weight of {:.2f} MN above it turns with {:.2f} MNm towards {:.0f} deg about the centroid of what is left, {:.2f} m off the axis, which resists with {:.2f} MNm at most: it {}.", "Das Sprengmaul von {} bei {} m lässt {} deg des Rings stehen. Das Gewicht von {} MN darüber dreht mit {} MNm nach {} deg um den Schwerpunkt des Rests, {} m neben der Achse; der Rest widersteht höchstens mit {} MNm: {}."],
   ["Cables are not counted in that.", "Seile sind darin nicht gezählt."],
   ["turns over", "Er kippt"],
