@@ -49,8 +49,9 @@ json runs_json(const Problem& p, const StudyResult& r, const std::vector<int>& c
   const std::vector<Curve> curves = list_curves(p, r.alpha.archive);
   std::size_t points = 0;
   for (const Curve& c : curves) points += c.is_outline ? 0 : c.at.size();
-  std::vector<float> ordinates;
+  std::vector<float> ordinates;  // over the first run that has them: what varies counts, not what all share
   ordinates.reserve(chosen.size() * points);
+  std::vector<double> bases(points, std::numeric_limits<double>::quiet_NaN());
   std::vector<std::vector<double>> derived_values;
   if (p.calc_derived)
     for (const int i : chosen) derived_values.push_back(p.calc_derived(r.alpha.archive[i].x));
@@ -94,15 +95,21 @@ json runs_json(const Problem& p, const StudyResult& r, const std::vector<int>& c
     out["membership"].push_back(number(uncertainty::calc_membership(p.space, s.x)));
     out["outcome"].push_back(place.at(uncertainty::outcome_of(s.result)));
     if (s.result.state == uncertainty::Result::State::Failed) out["failure"][std::to_string(i)] = s.result.text;
-    std::size_t begin = 0;
+    std::size_t begin = 0, point = 0;
     for (const Curve& c : curves) {
-      for (std::size_t t = begin; t < begin + c.at.size() && !c.is_outline; ++t)
-        ordinates.push_back(t < s.result.trajectory.size() ? static_cast<float>(s.result.trajectory[t] / c.unit_value)
-                                                           : std::numeric_limits<float>::quiet_NaN());
+      for (std::size_t t = begin; t < begin + c.at.size() && !c.is_outline; ++t) {
+        double& base = bases[point++];
+        const double value = t < s.result.trajectory.size() ? s.result.trajectory[t] / c.unit_value
+                                                            : std::numeric_limits<double>::quiet_NaN();
+        if (!std::isfinite(base) && std::isfinite(value)) base = value;
+        ordinates.push_back(static_cast<float>(value - base));
+      }
       begin += c.at.size();
     }
   }
   out["points"] = points;
+  out["trajectory_base"] = json::array();
+  for (const double base : bases) out["trajectory_base"].push_back(number(base, 17));
   out["trajectories"] = encode_base64(to_little_endian(std::span<const float>(ordinates)));
   return out;
 }

@@ -72,6 +72,10 @@ describe("a study's parts", () => {
   it("refuses data that are damaged or of another kind", () => {
     const study = makeStudy(10);
     assert.equal(readStudy(JSON.stringify(study)).run_table.trajectories.length, 110);
+    // curves lie over a base for each of their points, if the page has one
+    const { run_table } = study, first = readStudy(JSON.stringify(study)).run_table.trajectories;
+    const over = readStudy(JSON.stringify({ ...study, run_table: { ...run_table, trajectory_base: Array.from({ length: 11 }, (_, k) => 1e9 + k) } })).run_table.trajectories;
+    assert.deepEqual([...over.slice(0, 12)], [...first.slice(0, 12)].map((y, i) => y + 1e9 + (i % 11)));
     const short = { ...study, run_table: { ...study.run_table, membership: [1] } };
     assert.throws(() => readStudy(JSON.stringify(short)), /membership has 1 values, not 10/);
     assert.throws(() => readStudy(JSON.stringify({ ...study, version: 9 })), /version 9/);

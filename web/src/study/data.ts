@@ -86,7 +86,7 @@ export interface RunTable {
   outcome: number[]; // index into outcomes
   failure: Record<string, string>;
   points: number; // of the curves that are no outlines, one behind the other
-  trajectories: Float32Array; // (R x points)
+  trajectories: Float64Array; // (R x points)
 }
 /// What whole runs make of a condensed study's bounds and outcomes.
 export interface Confirmation {
@@ -148,7 +148,10 @@ export function readStudy(text: string): Study {
     throw new Error("This file does not hold the data of a study.");
   if (raw.version !== 1) throw new Error(`The data of this page has version ${raw.version}; this page reads version 1.`);
   const table = raw.run_table;
-  const study: Study = { ...raw, run_table: { ...table, trajectories: decodeFloats(table.trajectories) } };
+  // over a base for each point, which older pages have not
+  const base: Maybe[] = table.trajectory_base ?? [];
+  const trajectories = Float64Array.from(decodeFloats(table.trajectories), (y, i) => y + (base.length > 0 ? (base[i % base.length] ?? NaN) : 0));
+  const study: Study = { ...raw, run_table: { ...table, trajectories } };
   const expect = (what: string, size: number, expected: number): void => {
     if (size !== expected) throw new Error(`The data of this page is damaged: ${what} has ${size} values, not ${expected}.`);
   };
