@@ -207,7 +207,7 @@ void Pool::run_jobs(Store& store, const std::string& name, std::vector<Job> jobs
 }
 
 void Pool::keep_alive() {
-  const double interval = options_.lease / 3;
+  const double interval = std::min(options_.lease / 3, 1e5);  // what a clock can wait for
   std::unique_ptr<Store> store;
   while (!stop_) {
     {
