@@ -119,14 +119,20 @@ double calc_away(const BlockFrame& block, const Knowledge& k) {
   return std::isfinite(down + aside) ? std::max(down, aside) : std::numeric_limits<double>::quiet_NaN();
 }
 
-double find_deciding_touchdown(const std::vector<BlockFrame>& frames, const std::vector<double>& touchdowns,
-                               const Knowledge& k) {
-  for (const double time : touchdowns) {
-    BlockFrame at = find_block(frames, time);
-    if (at.connected < k.mechanism_coherent_share) at.displacement = at.pieces.displacement;
-    if (!(-at.displacement.z < k.stands_displacement)) return time;
+void find_deciding_touchdown(MechanismInput& in, const Knowledge& k) {
+  const auto decides = [&](double time) {
+    const BlockFrame at = find_block(in.frames, time);
+    const Vec3& way = at.connected < k.mechanism_coherent_share ? at.pieces.displacement : at.displacement;
+    return !(-way.z < k.stands_displacement);
+  };
+  in.touchdown = std::numeric_limits<double>::quiet_NaN();
+  for (const auto* times : {&in.touchdowns, &in.all_touchdowns}) {
+    const auto found = std::find_if(times->begin(), times->end(), decides);
+    if (found == times->end()) continue;
+    in.touchdown = *found;
+    break;
   }
-  return std::numeric_limits<double>::quiet_NaN();
+  in.is_later_touchdown = !in.all_touchdowns.empty() && in.touchdown > in.all_touchdowns.front();
 }
 
 Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
@@ -308,6 +314,7 @@ std::vector<NearVerdict> find_near_verdicts(const MechanismInput& in, const Know
       MechanismInput then = in;
       if (bound == &Knowledge::mechanism_direction_tolerance && then.direction_tolerance)
         *then.direction_tolerance *= times;
+      if (!in.all_touchdowns.empty()) find_deciding_touchdown(then, other);
       add({judge_mechanism(then, other), 0, rule, times});
     }
   }

@@ -41,10 +41,11 @@ struct BlockFrame {
 
 struct MechanismInput {
   std::vector<BlockFrame> frames;
-  double last_charge = 0;           // [s]
-  double touchdown = 0;             // that decides (find_deciding_touchdown); NaN if there was none [s]
-  bool is_later_touchdown = false;  // others were before it
-  Vec3 fall_direction{-1, 0, 0};    // planned, or expected
+  double last_charge = 0;                          // [s]
+  double touchdown = 0;                            // that decides (find_deciding_touchdown); NaN if there was none [s]
+  bool is_later_touchdown = false;                 // others were before it
+  std::vector<double> touchdowns, all_touchdowns;  // of bodies of the block, and of all upper ones, rising [s]
+  Vec3 fall_direction{-1, 0, 0};                   // planned, or expected
   bool is_direction_planned = false;
   std::optional<double> direction_tolerance;  // [rad]; not given: the rule's
   Polygon outline;                            // of the upper block seen from above, from its mass centre; convex [m]
@@ -89,10 +90,9 @@ double calc_tilt(const Quat& rotation, const Vec3& fall_direction);
 /// side over that or, if more, over stands.drift of its height, the larger; NaN if it is nowhere.
 double calc_away(const BlockFrame&, const Knowledge&);
 
-/// The first touchdown of an upper body at which the block, or all of it where it is in pieces, has come down by
-/// stands.displacement: what falls off a building that still stands does not decide. NaN: none.
-///   touchdowns  rising [s]
-double find_deciding_touchdown(const std::vector<BlockFrame>&, const std::vector<double>& touchdowns, const Knowledge&);
+/// Sets `touchdown`: the first of the block, or else of any upper body, by which the block, or all of it where it is in
+/// pieces, has come down by stands.displacement: what falls off a building that still stands does not decide.
+void find_deciding_touchdown(MechanismInput&, const Knowledge&);
 
 /// Judges frames; there is at least one.
 Mechanism judge_mechanism(const MechanismInput&, const Knowledge&);

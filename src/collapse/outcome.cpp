@@ -63,9 +63,8 @@ std::vector<MechanismInput> make_mechanism_inputs(const product::Plan& plan, con
   std::vector<MechanismInput> out;
   for (size_t s = 0; s < S; ++s) {
     in.frames = recorder.block_frames(s);
-    const std::vector<double> touchdowns = recorder.upper_touchdowns(s);
-    in.touchdown = find_deciding_touchdown(in.frames, touchdowns, k);
-    in.is_later_touchdown = !touchdowns.empty() && in.touchdown > touchdowns.front();
+    in.touchdowns = recorder.upper_touchdowns(s, true), in.all_touchdowns = recorder.upper_touchdowns(s, false);
+    find_deciding_touchdown(in, k);
     if (mass[s] > 0) centre[s] = (1 / mass[s]) * centre[s];
     for (Point2& p : corners[s]) p = {p[0] - centre[s].x, p[1] - centre[s].y};
     in.outline = calc_hull(std::move(corners[s]));

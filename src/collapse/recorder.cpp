@@ -178,7 +178,7 @@ const StubEntry* Recorder::find_crushed_stub(size_t zone, const mbs::View& v) co
   return nullptr;
 }
 
-std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
+std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) {
   const size_t B = model_.bodies.size(), S = map_.structures.size();
   std::vector<BlockFrame> out(S);
   DisjointSets linked(B);
@@ -196,7 +196,11 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
   for (size_t j = 0; j < model_.joints.size(); ++j)
     if (!v.joint_released[j]) link(model_.joints[j].parent, model_.joints[j].child);
   std::vector<double> group(B, 0);
-  std::vector<double> upper(S, 0), moving(S, 0);
+  std::vector<double> upper(S, 0), moving(S, 0), apart(S, 0);
+  std::vector<bool> has_come_down(B, false);
+  if (apart_since_.empty()) apart_since_.assign(B, std::numeric_limits<double>::infinity());
+  is_of_block_.assign(B, 0);
+  const auto is_apart = [this](size_t b) { return std::isfinite(apart_since_[b]); };
   double beside = 0, beside_moved = 0;
   const double far =
       k_.mechanism_moved_displacement * (map_.ground_storey_height > 0 ? map_.ground_storey_height : 1.0);
@@ -222,6 +226,12 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
     if (has_moved) f.moved += m;
     if (is_down) f.down += m;
     if (!map_.bodies[b].is_upper) continue;
+    has_come_down[b] = is_down;
+    f.fastest = std::max(f.fastest, norm(v.v_WB[b]));
+    if (is_apart(b)) {
+      apart[s] += m;
+      continue;
+    }
     upper[s] += m;
     group[static_cast<size_t>(linked.find(static_cast<int>(b)))] += m;
     const double turn = calc_tilt(v.X_WB[b].q * conjugate(start_[b].q), map_.fall_direction);
@@ -230,7 +240,6 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
     const double aside = calc_tilt(v.X_WB[b].q * conjugate(start_[b].q), cross({0, 0, 1}, map_.fall_direction));
     if (aside > k_.mechanism_fold_rotation) f.left += m;
     if (aside < -k_.mechanism_fold_rotation) f.right += m;
-    f.fastest = std::max(f.fastest, norm(v.v_WB[b]));
   }
   for (size_t s = 0; s < S; ++s) {
     BlockFrame& f = out[s];
@@ -257,7 +266,7 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
       std::vector<FitBody> bodies;
       BlockFrame::Motion motion;
       for (size_t b = 0; b < B; ++b) {
-        if (!is_upper(static_cast<int>(b)) || !belongs(static_cast<int>(b))) continue;
+        if (!is_upper(static_cast<int>(b)) || is_apart(b) || !belongs(static_cast<int>(b))) continue;
         bodies.push_back({v.mass[b], model_.bodies[b].inertia, start_[b], v.X_WB[b]});
         motion.displacement += v.mass[b] * (centre_of(b) - start_of(b));
         motion.above += v.mass[b] * start_of(b).z;
@@ -273,6 +282,16 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
     f.pieces = f.connected == 1 ? block : find_motion(upper[s], [&](int b) {
       return map_.bodies[static_cast<size_t>(b)].structure == static_cast<int>(s);
     });
+    // what comes down while the rest stands has fallen off: it is no part of how that falls
+    const bool stands = -f.displacement.z < k_.stands_displacement &&
+                        group[largest] >= k_.mechanism_coherent_share * (upper[s] + apart[s]);
+    const bool is_in_pieces = f.connected < k_.mechanism_coherent_share;
+    for (size_t b = 0; b < B; ++b) {
+      if (!is_upper(static_cast<int>(b)) || is_apart(b) || map_.bodies[b].structure != static_cast<int>(s)) continue;
+      const bool is_in_largest = linked.find(static_cast<int>(b)) == static_cast<int>(largest);
+      is_of_block_[b] = is_in_largest || is_in_pieces;
+      if (stands && !is_in_largest && has_come_down[b]) apart_since_[b] = v.time, is_of_block_[b] = 0;
+    }
   }
   return out;
 }
@@ -295,11 +314,12 @@ std::vector<BlockFrame> Recorder::farthest_block_frames(const std::vector<bool>&
   return out;
 }
 
-std::vector<double> Recorder::upper_touchdowns(size_t structure) const {
+std::vector<double> Recorder::upper_touchdowns(size_t structure, bool of_block) const {
   std::vector<double> times;
   for (const Touchdown& t : touchdowns_) {
     const BodyEntry& body = map_.bodies[static_cast<size_t>(t.body)];
-    if (body.is_upper && body.structure == static_cast<int>(structure)) times.push_back(t.time);
+    if (body.is_upper && body.structure == static_cast<int>(structure) && (t.is_of_block || !of_block))
+      times.push_back(t.time);
   }
   std::sort(times.begin(), times.end());
   return times;
@@ -360,12 +380,16 @@ void Recorder::follow(const Recorder& before, double until) {
     last_v_ = before.last_v_;
     shortening_ = before.shortening_;
     impulse_until_now_ = before.impulse_until_now_;
+    is_of_block_ = before.is_of_block_;
   } else if (!before.impulse_.empty()) {
     impulse_until_now_ = interpolate(before.record_.time, before.impulse_, until);
   }
   for (const Touchdown& t : before.touchdowns_)
     if (t.time <= until) touchdowns_.push_back(t);
   if (before.first_.time <= until) first_ = before.first_;
+  apart_since_ = before.apart_since_;
+  for (double& since : apart_since_)
+    if (since > until) since = std::numeric_limits<double>::infinity();
 }
 
 void Recorder::append(const Recorder& from, size_t frames, double until) {
@@ -427,7 +451,8 @@ void Recorder::pass(Io& io, R& r) {
   pass_events(io, record.events), pass_events(io, r.coming_);
   io(r.start_), io(r.block_), io(r.zone_frames_), io(r.shortening_), io(r.crushed_), io(r.stages_told_), io(r.last_v_),
       io(r.last_time_), io(r.touchdowns_), io(r.first_), io(r.speeds_.velocity), io(r.speeds_.spin),
-      io(r.reaction_error_), io(r.impulse_until_now_), io(r.impulse_), io(r.contacts_told_), io(r.states_before_);
+      io(r.reaction_error_), io(r.impulse_until_now_), io(r.impulse_), io(r.contacts_told_), io(r.states_before_),
+      io(r.apart_since_), io(r.is_of_block_);
 }
 
 void Recorder::write(ArchiveWriter& out) const { pass(out, *this); }
@@ -656,8 +681,14 @@ void Recorder::add_happening(const mbs::Happening& h) {
     case Kind::GroundContact: {
       const bool upper = map_.bodies[static_cast<size_t>(h.index)].is_upper;
       const mbs::Landing& with = h.landing;
-      touchdowns_.push_back(
-          {h.time, h.index, {with.p_WB.x, with.p_WB.y}, h.speed, with.energy, with.momentum, with.kinetic});
+      touchdowns_.push_back({h.time,
+                             h.index,
+                             {with.p_WB.x, with.p_WB.y},
+                             h.speed,
+                             with.energy,
+                             with.momentum,
+                             with.kinetic,
+                             is_of_block_.empty() || is_of_block_[static_cast<size_t>(h.index)] != 0});
       if (upper && !std::isfinite(first_.time)) first_ = touchdowns_.back();
       add_event(
           {h.time, "touchdown", body(h.index),

@@ -69,8 +69,9 @@ class Recorder {
   ///   counts  which structures are looked at, one at least; empty: all (structures)
   std::vector<BlockFrame> farthest_block_frames(const std::vector<bool>& counts = {}) const;
   const std::vector<ZoneFrame>& zone_frames() const { return zone_frames_; }
-  double first_touchdown() const { return first_.time; }         // of an upper body; NaN if none [s]
-  std::vector<double> upper_touchdowns(size_t structure) const;  // of its upper bodies, rising [s]
+  double first_touchdown() const { return first_.time; }  // of an upper body; NaN if none [s]
+  /// Of its upper bodies, rising; those of the block alone (Touchdown::is_of_block) or of all [s].
+  std::vector<double> upper_touchdowns(size_t structure, bool of_block) const;
   std::string first_touchdown_body() const {
     return first_.body < 0 ? std::string() : map_.bodies[static_cast<size_t>(first_.body)].name;
   }
@@ -91,7 +92,7 @@ class Recorder {
   /// To the callback.
   void tell_coming(double until);
   record::Series& series(size_t i) { return record_.series[i]; }
-  std::vector<BlockFrame> calc_blocks(const mbs::View&) const;
+  std::vector<BlockFrame> calc_blocks(const mbs::View&);
   /// Ends of what is drawn that recede as members are crushed.
   void find_crushed_ends();
   void let_ends_recede(const mbs::View&);
@@ -112,6 +113,8 @@ class Recorder {
   std::vector<record::Event> coming_;  // not told yet, in the order of time
   std::vector<Pose> start_;
   std::vector<std::vector<BlockFrame>> block_;  // of each structure
+  std::vector<double> apart_since_;             // of upper bodies that came down before their block; else infinite (B)
+  std::vector<std::uint8_t> is_of_block_;       // at the last frame, or one of pieces (B); empty: not known
   std::vector<ZoneFrame> zone_frames_;
   std::vector<double> shortening_;        // of the last frame
   std::vector<mbs::CrushedBox> crushed_;  // of the last frame, as Record::crushed_ends; shapes as drawn

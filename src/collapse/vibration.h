@@ -20,6 +20,8 @@ struct Touchdown {
   double energy = 0;    // kinetic, of the part alone [J]
   double momentum = 0;  // vertical, of the part alone, downwards positive [N·s]
   double kinetic = 0;   // energy of all parts that move then [J]
+  bool is_of_block =
+      true;  // of the largest connected part then, or of one among pieces; not what had fallen off before
 };
 
 /// Velocities of the model's bodies, the first B of a record, at its frames.

@@ -14,8 +14,6 @@ namespace {
 
 // along a line a corner of a free box moves at most so much more easily than its centre: 1 + 3 + 3 of a plate
 constexpr double kCornerOverCentre = 7;
-// from here on those of a free body that is no plain box count
-constexpr double kFarOverCentre = 13;
 constexpr double kRidge = 1e-9;  // of the trace, so that what joints hold altogether has a factor
 
 /// Lower factor of a symmetric 6 x 6 matrix, its rotations measured with a length, with a ridge.
@@ -170,41 +168,11 @@ double System::calc_mobility_along(size_t b, int mobility, const Vec3& lever, co
   return std::max(0.0, sum);
 }
 
-bool System::reaches_far(const BodyConstants& body) const {
-  const auto is_far = [&body](const Vec3& r) {
-    // the largest of n·(1/m + r x W x r)·n: r x W x r has no part along r
-    const Vec3 turn[3] = {cross(r, {1, 0, 0}), cross(r, {0, 1, 0}), cross(r, {0, 0, 1})};
-    double sum = 0, squares = 0;
-    for (int i = 0; i < 3; ++i) {
-      sum += dot(turn[i], body.inverse_inertia * turn[i]);
-      for (const Vec3& other : turn) squares += std::pow(dot(turn[i], body.inverse_inertia * other), 2);
-    }
-    const double largest = 0.5 * (sum + std::sqrt(std::max(0.0, 2 * squares - sum * sum)));
-    return largest > (kFarOverCentre - 1) * body.inverse_mass;
-  };
-  for (int i = body.first_shape; i < body.first_shape + body.shapes; ++i) {
-    const CompiledShape& shape = state.shapes[static_cast<size_t>(i)];
-    for (int corner = 0; corner < count_corners(shape); ++corner) {
-      const Vec3 at = shape.kind == Shape::Kind::Hull
-                          ? hulls[static_cast<size_t>(shape.hull)].vertices[static_cast<size_t>(corner)]
-                      : shape.kind == Shape::Kind::Box
-                          ? Vec3{corner & 1 ? shape.half.x : -shape.half.x, corner & 2 ? shape.half.y : -shape.half.y,
-                                 corner & 4 ? shape.half.z : -shape.half.z}
-                          : Vec3{};
-      if (is_far(shape.p_BS + shape.R_BS * at)) return true;
-    }
-  }
-  return false;
-}
-
 bool System::fit_points(size_t a, size_t b, const Vec3& n, size_t first, const ContactLaw& law, ContactGroup& g) {
   const size_t body[2] = {a, b};
   const int mobility[2] = {find_mobility(a), find_mobility(b)};
+  if (mobility[0] < 0 && mobility[1] < 0) return false;
   const auto is_moving = [&](size_t i) { return body[i] < B && !fixed[body[i]]; };
-  const auto reaches_far = [&](size_t i) { return is_moving(i) && state.body[body[i]].reaches_far; };
-  const bool is_jointed = mobility[0] >= 0 || mobility[1] >= 0;
-  if (!is_jointed && (law.stiffness > 0 || !(reaches_far(0) || reaches_far(1)))) return false;
-  const double most = is_jointed ? kCornerOverCentre : kFarOverCentre;
   const auto along = [&](size_t i, const Vec3& lever, const Vec3& axis) {
     return is_moving(i) ? calc_mobility_along(body[i], mobility[i], lever, axis) : 0;
   };
@@ -221,12 +189,12 @@ bool System::fit_points(size_t a, size_t b, const Vec3& n, size_t first, const C
     double at_point = 0, all = 0;
     for (size_t i = 0; i < 2; ++i) {
       const double here = along(i, lever[i], n);
-      own[i] = std::max(own[i], here / most);
+      own[i] = std::max(own[i], here / kCornerOverCentre);
       at_point += here;
       for (const Vec3& axis : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}}) all += along(i, lever[i], axis);
     }
-    normal = std::max(normal, at_point / most);
-    across = std::max(across, (all - at_point) / most);
+    normal = std::max(normal, at_point / kCornerOverCentre);
+    across = std::max(across, (all - at_point) / kCornerOverCentre);
   }
   g.mobility_a = mobility[0] < 0 ? 0 : own[0], g.mobility_b = mobility[1] < 0 ? 0 : own[1];
   if (law.stiffness > 0) {
@@ -238,7 +206,6 @@ bool System::fit_points(size_t a, size_t b, const Vec3& n, size_t first, const C
   double inverse_mass = 0;
   for (size_t i = 0; i < 2; ++i)
     if (is_moving(i)) inverse_mass += state.body[body[i]].inverse_mass;
-  if (!is_jointed && normal <= inverse_mass) return false;
   for (size_t p = first; p < contact.point.size(); ++p) contact.point[p].stiffness *= inverse_mass / normal;
   g.stiffness = frequency2 / normal;
   g.stick = frequency2 / std::max(normal, across);

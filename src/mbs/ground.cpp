@@ -22,7 +22,6 @@ Vec3 corner_of(const Vec3& half, int corner) {
 bool System::is_ground_box(size_t b) const {
   const BodyConstants& body = state.body[b];
   return model.contact.ground && !model.contact.bodies && !fixed[b] && jointed[b] < 2 && body.shapes == 1 &&
-         !body.reaches_far &&
          state.shapes[static_cast<size_t>(body.first_shape)].kind == Shape::Kind::Box &&
          state.shapes[static_cast<size_t>(body.first_shape)].crushed < 0;
 }

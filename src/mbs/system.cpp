@@ -286,7 +286,7 @@ void System::append_shapes(const Body& body, BodyConstants& c) {
     c.radius = std::max(c.radius, norm(s.X_BS.p) + compiled.reach);
     state.shapes.push_back(compiled);
   }
-  c.reaches_far = reaches_far(c);
+  c.contact_stretch = calc_contact_stretch(c);
 }
 
 int System::count_corners(const CompiledShape& shape) const {

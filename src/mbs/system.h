@@ -28,7 +28,7 @@ struct BodyConstants {
   Mat3 inertia, inverse_inertia;    // in B
   double radius = 0;                // of the sphere about the centre of mass that holds all shapes [m]
   int first_shape = 0, shapes = 0;  // into State::shapes
-  bool reaches_far = false;         // points that move far more easily than the centre of mass (contact.md, 3b)
+  double contact_stretch = 1;       // of the square of a contact's frequency by far points (contact.md)
 };
 
 struct CompiledElement {
@@ -531,7 +531,7 @@ class System {
   double calc_mobility_along(size_t body, int mobility, const Vec3& lever, const Vec3& axis) const;
   /// Stiffness of the points from `first` on by what joints leave of the mobility of the two bodies, and what their
   /// group shall know of it. False: none hold them.
-  bool reaches_far(const BodyConstants&) const;
+  double calc_contact_stretch(const BodyConstants&) const;
   bool fit_points(size_t a, size_t b, const Vec3& n, size_t first, const ContactLaw&, ContactGroup&);
   /// Hands that on to the last group.
   void keep_mobility(const ContactGroup& fitted);

@@ -118,12 +118,16 @@ TEST(Mechanism, WhatFallsOffABuildingThatStandsDoesNotDecide) {
   const BlockFrame start = in.frames.front();
   for (BlockFrame& f : in.frames) f.time += 1;
   in.frames.insert(in.frames.begin(), start);
-  const auto find = [&in](std::vector<double> times) {
-    return find_deciding_touchdown(in.frames, times, default_knowledge());
+  const auto find = [&in](std::vector<double> of_block, std::vector<double> all) {
+    in.touchdowns = std::move(of_block), in.all_touchdowns = std::move(all);
+    find_deciding_touchdown(in, default_knowledge());
+    return in.touchdown;
   };
-  EXPECT_EQ(find({0.5, 0.9, 2.0, 2.1}), 2.0);
-  EXPECT_TRUE(std::isnan(find({0.5, 0.9})));
-  EXPECT_TRUE(std::isnan(find({})));
+  EXPECT_EQ(find({2.0, 2.1}, {0.5, 0.9, 1.9, 2.0, 2.1}), 2.0);
+  EXPECT_TRUE(in.is_later_touchdown);
+  EXPECT_EQ(find({}, {0.5, 0.9, 2.2}), 2.2) << "it comes down on its own rubble";
+  EXPECT_TRUE(std::isnan(find({}, {0.5, 0.9})));
+  EXPECT_TRUE(std::isnan(find({}, {})));
   in.touchdown = 2, in.is_later_touchdown = true;
   EXPECT_THAT(judge_mechanism(in, default_knowledge()).text,
               testing::HasSubstr("when the upper block has come down and touches the ground, at 2.00 s"));
@@ -133,7 +137,7 @@ TEST(Mechanism, WhatFallsOffABuildingThatStandsDoesNotDecide) {
   // in pieces all of it counts
   for (BlockFrame& f : in.frames) take_apart(f, 0.4);
   in.frames[0].pieces.displacement = in.frames[1].pieces.displacement = {0, 0, -1};
-  EXPECT_EQ(find({0.5, 0.9}), 0.5);
+  EXPECT_EQ(find({0.5}, {0.5, 0.9}), 0.5);
 }
 
 TEST(Mechanism, FoldsAboutEitherAxis) {

@@ -270,7 +270,7 @@ Model make_hammer(double ratio) {
 }
 
 TEST(FreeContact, AFarPointReturnsItsRestitution) {
-  // with the stiffness of the whole mass a point that moves 3000 times as easily returned 4.3 of its speed
+  // in steps for the whole mass a point that moves 3000 times as easily returned 4.3 of its speed
   for (const double ratio : {3.0, 12.0, 14.0, 100.0, 3000.0}) {
     const Outcome out = let_go(make_hammer(ratio), 0.05);
     const Vec3 tip = out.last.v_WB[0] + cross(out.last.w_WB[0], to_matrix(out.last.X_WB[0].q) * Vec3{1, 0, 0});
