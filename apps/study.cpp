@@ -59,12 +59,15 @@ int complain(const InputError& e, const std::string& text, bool as_json) {
   return kBadInput;
 }
 
-void read_what_is_there(const StudyPlace& place, study::Problem& problem, StudyResult& r) {
+void read_what_is_there(const StudyPlace& place, study::Problem& problem, StudyResult& r, std::string& source,
+                        std::string& source_name) {
   study::Store store(place.store);
   const std::optional<study::StudyRow> row = store.find_study(place.name);
   if (!row) return;
   problem = read_problem(*row);
   r = study::read_study(problem, store, *row);
+  const nlohmann::json definition = nlohmann::json::parse(row->definition);
+  source = definition.value("text", ""), source_name = definition.value("file", "");
 }
 
 /// Throws InputError E822 if a folder for files is that of another study than `from`.
@@ -115,6 +118,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   ProgressLine line;
   StudyResult r;
   bool is_finished = false;
+  std::string source_name = a.input;
   long answers = 0;
   const auto remove_new = [&] { return is_new && remove_unused(place, study::calc_model_hash(problem), answers); };
   const auto remove_empty_folder = [&] {
@@ -127,7 +131,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
     });
     is_finished = r.is_finished;
     // what goes over its runs again may have met few of them: all is told that is there
-    if (!is_finished) read_what_is_there(place, problem, r);
+    if (!is_finished) read_what_is_there(place, problem, r, text, source_name);
   } catch (const InputError& e) {
     line.clear();
     const std::string& code = e.first_error().code;
@@ -166,7 +170,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   std::FILE* out = a.json ? stderr : stdout;
   print_study(out, problem, r);
   std::fprintf(out, "\n");
-  write_all(out, a.output, problem, r, text, a.input, a.language);
+  write_all(out, a.output, problem, r, text, source_name, a.language);
   if (a.json) std::fputs(study::write_results_json(problem, r).c_str(), stdout);
   if (!is_finished) {
     std::fprintf(stderr, "Interrupted. The same command goes on with the study.\n");

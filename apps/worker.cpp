@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "commands.h"
@@ -47,11 +46,12 @@ int run_worker(const Arguments& a, const std::atomic<bool>& cancel) {
                          fmt::format("there is no study \"{}\" in {}", place.name, study::hide_password(place.store)));
       return *row;
     };
-    // of a plan, whose condensed study has two models, any worker may take any run
-    if (is_for_one)
-      if (const study::StudyRow row = find_study();
-          nlohmann::json::parse(row.definition).at("identity").contains("command"))
-        options.model = row.model;
+    if (is_for_one) {
+      const study::StudyRow row = find_study();
+      options.models = {row.model};
+      if (const study::Problem problem = read_problem(row); problem.whole)
+        options.models.push_back(study::calc_model_hash(*problem.whole));
+    }
     const study::RunnerFactories factories = make_factories();
     study::Pool pool(place.store, factories, options);
     ProgressLine line;

@@ -142,6 +142,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   const bool touched = std::isfinite(in.touchdown);
   const BlockFrame at = touched ? find_block(in.frames, in.touchdown) : last;
   out.time = touched ? in.touchdown : last.time;
+  out.has_touchdown = touched;
   out.moved = last.down;
   out.run = last.centre - in.frames.front().centre;
   out.run.z = 0;

@@ -64,9 +64,10 @@ struct Fall {
 };
 
 struct Mechanism {
-  std::string name;       // "topple", "fold", "vertical", "progressive", "partial", "wrong direction", "stands"
-  std::string text;       // a sentence with its numbers
-  double time = 0;        // of judgement: the touchdown that decides, else the end [s]
+  std::string name;  // "topple", "fold", "vertical", "progressive", "partial", "wrong direction", "stands"
+  std::string text;  // a sentence with its numbers
+  double time = 0;   // of judgement: the touchdown that decides, else the end [s]
+  bool has_touchdown = false;
   double tilt = 0;        // then, towards the direction [rad]
   double rear_share = 0;  // then, drop of the rear edge over that of the front edge
   double foot_share = 0;  // the same at the block's underside, which rotation about a foot does not bring down

@@ -282,8 +282,11 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) {
     f.pieces = f.connected == 1 ? block : find_motion(upper[s], [&](int b) {
       return map_.bodies[static_cast<size_t>(b)].structure == static_cast<int>(s);
     });
-    // what comes down while the rest stands has fallen off: it is no part of how that falls
-    const bool stands = -f.displacement.z < k_.stands_displacement &&
+    // what comes down and lands while the rest stands has fallen off: it is no part of how that falls
+    const bool has_landed = std::any_of(touchdowns_.begin(), touchdowns_.end(), [&](const Touchdown& t) {
+      return is_upper(t.body) && map_.bodies[static_cast<size_t>(t.body)].structure == static_cast<int>(s);
+    });
+    const bool stands = has_landed && -f.displacement.z < k_.stands_displacement &&
                         group[largest] >= k_.mechanism_coherent_share * (upper[s] + apart[s]);
     const bool is_in_pieces = f.connected < k_.mechanism_coherent_share;
     for (size_t b = 0; b < B; ++b) {

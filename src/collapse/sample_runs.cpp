@@ -72,8 +72,10 @@ void add_frame(Sample& s, const Knowledge& k, const SampleRunOptions& options, c
   if (s.is_over) return;
   s.recorder->add_frame(v);
   if (!options.condensation || !options.ends_early || v.time >= calc_release(s.plan)) return;
-  const double touchdown = s.recorder->first_touchdown();
-  s.is_over = v.time >= touchdown + early_after && !stands(s.recorder->block_frames().back(), k);
+  // not where a bay or an annex has come down and the rest still stands or begins to move
+  const std::vector<double> touchdowns = s.recorder->upper_touchdowns(0, true);
+  s.is_over = !touchdowns.empty() && v.time >= touchdowns.front() + early_after &&
+              !stands(s.recorder->block_frames().back(), k);
 }
 
 void run_single(Sample& s, const Knowledge& k, const SampleRunOptions& options, const std::atomic<bool>* cancel) {
@@ -182,9 +184,15 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
     return find_zone_frames(s.record, find_zones_of(counts, s.map, s.record))[before].utilisation;
   };
   out.utilisation = out.stood ? find_use() : 1;
-  out.touchdown = s.recorder->first_touchdown();
+  // the one that decides; where none does, the first
+  out.touchdown = std::numeric_limits<double>::quiet_NaN();
+  for (const Mechanism& m : verdicts)
+    if (m.has_touchdown) out.touchdown = std::fmin(out.touchdown, m.time);
+  if (std::isnan(out.touchdown)) out.touchdown = s.recorder->first_touchdown();
   const std::vector<double>& kinetic = series("energy_kinetic");
-  out.touchdown_energy = out.touchdown <= out.time.back() ? s.recorder->first_touchdown_kinetic() : kinetic.back();
+  out.touchdown_energy = kinetic.back();
+  for (const Touchdown& t : s.recorder->touchdowns())
+    if (t.time == out.touchdown) out.touchdown_energy = t.kinetic;
   out.largest_energy = std::max(*std::max_element(kinetic.begin(), kinetic.end()), out.touchdown_energy);
   const size_t last = out.time.size() - 1;
   out.reach = calc_reach(s.record, last);

@@ -887,19 +887,44 @@ struct Evaluation {
     for (int q = first; q <= last; ++q) {
       force[shear_of(q)] = planes[q].shear(p.x, phi[q], n);
       force[bend_of(q)] = planes[q].moment(phi[q], n);
+      for (int s = 0; s < n; ++s) m[q][s] = Bending::at(force[bend_of(q)], force[shear_of(q)], p.x[s], planes[q].sign);
+    }
+    const auto added_of = [&](int q, int s) {
+      return phi[q][s] - z.station[s].phi[q] - z.station[s].soft[q] * m[q][s];
+    };
+    const auto spring_of = [&](int q, int s) {
+      return station_stiffness[q][s] / (1 + station_stiffness[q][s] * z.station[s].soft[q]);
+    };
+    // a station that is turned about an axis by the other end has hardly a moment there: both axes together bound it
+    const auto bound = [&](int q, int s) {
+      if constexpr (is_plane) return kUnlimited;
+      double turn2 = 0, moment2 = 0;
+      for (int r = first; r <= last; ++r) {
+        turn2 += std::pow(added_of(r, s) * spring_of(r, s), 2);
+        moment2 += m[r][s] * m[r][s];
+      }
+      return std::sqrt(turn2 / moment2) / spring_of(q, s);
+    };
+    double grown[2][2];
+    for (int q = first; q <= last; ++q) {
       for (int s = 0; s < n; ++s) {
         StationState& st = z.station[s];
-        m[q][s] = Bending::at(force[bend_of(q)], force[shear_of(q)], p.x[s], planes[q].sign);
-        const double added = phi[q][s] - st.phi[q] - st.soft[q] * m[q][s];
+        grown[q][s] = st.soft[q];
+        const double added = added_of(q, s);
         const double share = laws[s]->damage_share;
         if (turned[s] && share > 0 && added * m[q][s] > 0) {
           const double top = std::min(st.crack[q] + share * std::abs(beyond_cracks(phi, m, q, s)) / std::abs(m[q][s]),
                                       kMostDamage / station_stiffness[q][s]);
-          st.soft[q] = std::max(st.soft[q], std::min(top, st.soft[q] + share * added / m[q][s]));
+          grown[q][s] =
+              std::max(st.soft[q], std::min(top, st.soft[q] + share * std::min(added / m[q][s], bound(q, s))));
         }
-        st.phi[q] = phi[q][s] - st.soft[q] * m[q][s];
       }
     }
+    for (int q = first; q <= last; ++q)
+      for (int s = 0; s < n; ++s) {
+        z.station[s].soft[q] = grown[q][s];
+        z.station[s].phi[q] = phi[q][s] - grown[q][s] * m[q][s];
+      }
   }
 
   void slip(const Limits& limits) {

@@ -537,7 +537,7 @@ class Manager {
 
   void start_pool() {
     PoolOptions own = options_.pool;
-    own.model = asked_model_;  // programs of other studies may not be here
+    own.models = {asked_model_};  // programs of other studies may not be here
     pool_ = std::make_unique<Pool>(options_.store, factories_, own);
   }
 

@@ -7,9 +7,11 @@
 #include <cmath>
 #include <ctime>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <numbers>
 #include <optional>
+#include <set>
 
 #include "base/heap.h"
 #include "base/interpolate.h"
@@ -95,7 +97,7 @@ bool has_clearances(const PlanMappingOptions& o) { return o.findings && has_side
 
 namespace {
 
-/// "workshop" of "Workshop", with a number where that is not unique.
+/// "workshop" of "Workshop", with a number where that is not unique; no two are alike.
 std::string name_of_neighbour(const product::Plan& plan, size_t neighbour) {
   const auto slug = [&plan](size_t i) {
     std::string out;
@@ -109,10 +111,24 @@ std::string name_of_neighbour(const product::Plan& plan, size_t neighbour) {
     while (!out.empty() && out.back() == '_') out.pop_back();
     return out;
   };
-  const std::string own = slug(neighbour);
-  bool is_unique = !own.empty();
-  for (size_t i = 0; i < plan.neighbours.size(); ++i) is_unique = is_unique && (i == neighbour || slug(i) != own);
-  return is_unique ? own : fmt::format("{}{}{}", own, own.empty() ? "" : "_", neighbour + 1);
+  std::vector<std::string> names;
+  std::map<std::string, int> counts;
+  for (size_t i = 0; i < plan.neighbours.size(); ++i) ++counts[names.emplace_back(slug(i))];
+  // one that has its name alone keeps it, and nobody else gets it
+  std::set<std::string> taken;
+  const auto is_alone = [&](size_t i) { return !names[i].empty() && counts[names[i]] == 1; };
+  for (size_t i = 0; i < names.size(); ++i)
+    if (is_alone(i)) taken.insert(names[i]);
+  for (size_t i = 0; i <= neighbour; ++i) {
+    if (is_alone(i)) continue;
+    const std::string own = names[i];
+    size_t number = i + 1;
+    do {
+      names[i] = fmt::format("{}{}{}", own, own.empty() ? "" : "_", number);
+      number += plan.neighbours.size();
+    } while (!taken.insert(names[i]).second);
+  }
+  return names[neighbour];
 }
 
 }  // namespace

@@ -33,6 +33,7 @@ std::string make_name() {
 
 Pool::Pool(std::string address, const RunnerFactories& factories, const PoolOptions& options)
     : address_(std::move(address)), name_(make_name()), factories_(factories), options_(options), last_work_(now()) {
+  if (options_.models.empty()) options_.models.emplace_back();
   for (int i = 0; i < options.jobs; ++i) names_.push_back(fmt::format("{}:{}", name_, i));
   for (const std::string& n : names_) threads_.emplace_back([this, n] { work(n); });
   if (!names_.empty()) threads_.emplace_back([this] { keep_alive(); });
@@ -98,7 +99,11 @@ void Pool::work(const std::string& name) {
         wakes = wake_count_;
       }
       const bool may_suspect = !has_suspect_.exchange(true);
-      std::vector<Job> jobs = store.claim(name, options_.batch, options_.lease, options_.model, may_suspect);
+      std::vector<Job> jobs;
+      for (const std::string& model : options_.models) {
+        jobs = store.claim(name, options_.batch, options_.lease, model, may_suspect);
+        if (!jobs.empty()) break;
+      }
       const bool is_suspect = may_suspect && !jobs.empty() && jobs.front().vanished >= suspect_vanished;
       if (may_suspect && !is_suspect) has_suspect_ = false;
       if (!jobs.empty()) {

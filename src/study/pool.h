@@ -15,11 +15,11 @@
 namespace topple::study {
 
 struct PoolOptions {
-  int jobs = 1;           // at the same time
-  int batch = 1;          // points that a runner gets at once
-  double lease = 30;      // a job is given to another worker so long after a sign of life [s]
-  std::string model;      // the only one whose jobs are taken; empty: any
-  double patience = 300;  // with a server that is away [s]
+  int jobs = 1;                     // at the same time
+  int batch = 1;                    // points that a runner gets at once
+  double lease = 30;                // a job is given to another worker so long after a sign of life [s]
+  std::vector<std::string> models;  // the only ones whose jobs are taken, in this order; empty: any
+  double patience = 300;            // with a server that is away [s]
 };
 
 class Pool {

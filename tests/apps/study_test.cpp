@@ -337,6 +337,16 @@ TEST_F(StudyFaults, OfOneCommandInTwoPlacesShareNoRunsOnAServer) {
   EXPECT_EQ(wait_for(own), 0) << read(folder / "log");
   EXPECT_TRUE(has("b/open-b", "\"lies\"") && !has("b/open-b", "\"falls\""));
   EXPECT_EQ(number(*db, "SELECT count(*) FROM result r JOIN study s ON s.model = r.model WHERE s.name = 'open-a'"), 0);
+  // nor does one of a plan's study, whose whole runs it does, too
+  std::ofstream(folder / "b/plan.toml") << collapse::house(
+      collapse::charge("C-A*-0") +
+      "[fuzzy]\nconcrete.C25.fc = { triangular = [\"15 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }\n");
+  const pid_t planned = start(in("b", "study plan.toml -o plan --store " + server->url() +
+                                          " --jobs 0 --samples 20 --alpha 0,1 --condensed --confirm 4 --no-drivers"));
+  wait_until([&] { return number(*db, "SELECT count(*) FROM study WHERE name = 'plan'") == 1; });
+  EXPECT_EQ(run(in("b", "worker " + server->url() + " --name plan --jobs 1")), 0) << read(folder / "log");
+  EXPECT_EQ(wait_for(planned), 0) << read(folder / "log");
+  EXPECT_EQ(number(*db, "SELECT count(*) FROM result r JOIN study s ON s.model = r.model WHERE s.name = 'open-a'"), 0);
   kill(other, SIGINT);
   EXPECT_EQ(wait_for(other), 1);
   EXPECT_EQ(run({TOPPLE_PROGRAM, "worker", server->url(), "--name", "none"}), 2);

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
+#include <set>
 #include <thread>
 
 #include "../collapse/plans.h"
@@ -275,6 +276,17 @@ TEST(PlanMapping, NamesScreeningsApart) {
                           "vibration_5"};
   for (size_t i = 0; i < 5; ++i) EXPECT_EQ(name_of_screening(plan, i), wanted[i]);
   EXPECT_EQ(name_of_clearance(plan, 1), "clearance_house_7");
+  // a number never makes it the name of another: those of two neighbours were taken for each other
+  plan.neighbours.clear();
+  for (const char* name : {"Haus", "Haus 2", "haus", "ÐÐ¾Ð¼ 5", "Ð¨ÐºÐ¾Ð»Ð°"}) {
+    product::Neighbour n;
+    n.name = name;
+    plan.neighbours.push_back(n);
+  }
+  std::set<std::string> names;
+  for (size_t i = 0; i < 5; ++i) names.insert(name_of_clearance(plan, i));
+  EXPECT_EQ(names.size(), 5U);
+  EXPECT_EQ(name_of_clearance(plan, 1), "clearance_haus_2");
 }
 
 TEST(PlanMapping, RefusesPlansWithoutFuzzyValues) {
