@@ -236,10 +236,10 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.text =
         fmt::format("It folds: {:.0f} % of the upper mass turns to one side of the fall, {:.0f} % to the other; {}.",
                     100 * at.left, 100 * at.right, motion);
-  } else if (is_in_pieces && at.moved < k.mechanism_together_share) {
+  } else if ((1 - at.apart) * at.connected < k.mechanism_coherent_share && at.moved < k.mechanism_together_share) {
     out.name = "progressive";
     out.text = fmt::format("Progressive collapse: the largest connected part holds {:.0f} % of the upper mass; {}.",
-                           100 * at.connected, motion);
+                           100 * (1 - at.apart) * at.connected, motion);
   } else if (drops && !turns_about_foot) {
     out.name = "vertical";
     out.text = fmt::format("It comes down vertically (telescoping): {}.", motion);
@@ -255,6 +255,9 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.text +=
         fmt::format(" It is in pieces then, the largest of {:.0f} % of the upper mass: these numbers are of all.",
                     100 * at.connected);
+  if (at.apart > 0.005 && out.name != "stands" && out.name != "partial")
+    out.text += fmt::format(" Before, {:.0f} % of the upper mass had fallen off: these numbers are of the rest.",
+                            100 * at.apart);
   if (turns_about_foot && (out.name == "topple" || out.name == "wrong direction"))
     out.text += fmt::format(
         " At its foot the rear edge has come down {:.0f} % as far as the front edge: it turns about its foot.",

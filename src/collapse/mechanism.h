@@ -26,7 +26,8 @@ struct BlockFrame {
   Vec3 displacement;     //
   double above = 0;      //
   Motion pieces;         // of all upper bodies
-  double connected = 1;  // mass of the block over the mass of all upper bodies
+  double connected = 1;  // mass of the block over the mass of all upper bodies that have not fallen off before
+  double apart = 0;      // share of the upper mass that has (Recorder::apart_since_)
   double moved = 0;      // share of all moving mass of the structure that has gone farther than it may, to any side
   double down = 0;       // share of it that has come down
   double forward = 0;    // share of the upper mass that turned by more than mechanism.fold_rotation about the axis

@@ -262,6 +262,7 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) {
           (largest == B || group[b] > group[largest]))
         largest = b;
     f.connected = group[largest] / upper[s];
+    f.apart = apart[s] / (upper[s] + apart[s]);
     const auto find_motion = [&](double mass, auto belongs) {
       std::vector<FitBody> bodies;
       BlockFrame::Motion motion;
@@ -691,7 +692,9 @@ void Recorder::add_happening(const mbs::Happening& h) {
                              with.energy,
                              with.momentum,
                              with.kinetic,
-                             is_of_block_.empty() || is_of_block_[static_cast<size_t>(h.index)] != 0});
+                             is_of_block_.empty()
+                                 ? apart_since_.empty() || !std::isfinite(apart_since_[static_cast<size_t>(h.index)])
+                                 : is_of_block_[static_cast<size_t>(h.index)] != 0});
       if (upper && !std::isfinite(first_.time)) first_ = touchdowns_.back();
       add_event(
           {h.time, "touchdown", body(h.index),

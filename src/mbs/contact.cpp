@@ -69,7 +69,7 @@ double System::calc_contact_frequency() const {
       pieces = std::max(pieces, shapes);
   double stretch = pieces;
   for (size_t b = 0; b < B; ++b)
-    if (!fixed[b]) stretch = std::max(stretch, state.body[b].contact_stretch);
+    if (!fixed[b] && !jointed[b]) stretch = std::max(stretch, state.body[b].contact_stretch);
   return std::sqrt(most * stretch);
 }
 

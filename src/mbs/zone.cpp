@@ -898,6 +898,8 @@ struct Evaluation {
     // a station that is turned about an axis by the other end has hardly a moment there: both axes together bound it
     const auto bound = [&](int q, int s) {
       if constexpr (is_plane) return kUnlimited;
+      // an axis that has no limit left is lost as it was
+      if (!((m_trial[q][s] >= 0 ? most[q][s].positive : most[q][s].negative) > 0)) return kUnlimited;
       double turn2 = 0, moment2 = 0;
       for (int r = first; r <= last; ++r) {
         turn2 += std::pow(added_of(r, s) * spring_of(r, s), 2);

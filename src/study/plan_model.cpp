@@ -335,7 +335,7 @@ Problem make_plan_problem(const product::Plan& asked, const PlanMappingOptions& 
     identity["vibration"] = true;
     p.identity = identity.dump();
     list_vibration_limits(plan, p.limits);
-  } else {
+  } else if (plan.vibration) {
     for (const product::Neighbour& n : plan.neighbours)
       if (n.vibration_limit > 0 || n.building_class != product::BuildingClass::Unknown)
         p.not_judged.push_back("vibration: \"" + n.name + "\"");

@@ -17,6 +17,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["falls", "fällt"],
   ["No result", "Kein Ergebnis"],
   ["when the upper block first touches the ground, at {:.2f} s", "Wenn der obere Block zuerst den Boden berührt, bei {} s"],
+  ["Before, {:.0f} % of the upper mass had fallen off: these numbers are of the rest.", "Davor waren {} % der oberen Masse abgefallen: Diese Zahlen gelten für den Rest."],
   ["when the upper block has come down and touches the ground, at {:.2f} s", "Wenn der obere Block herabgekommen ist und den Boden berührt, bei {} s"],
   ["In the end", "Am Ende"],
   ["So far", "Bisher"],
