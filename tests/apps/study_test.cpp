@@ -364,7 +364,8 @@ TEST_F(StudyFaults, LeaveAFinishedStudyWhereItsRepetitionIsInterrupted) {
     std::this_thread::sleep_for(std::chrono::milliseconds(wait));
     kill(again, SIGINT);
     const int ending = wait_for(again);
-    EXPECT_TRUE(ending == 0 || ending == 1) << ending;
+    // on a busy machine it may not have begun to listen
+    EXPECT_TRUE(ending == 0 || ending == 1 || ending == -SIGINT) << ending;
     expect_same("out", "before");
     EXPECT_EQ(read(folder / "out/boxes.csv"), read(folder / "before/boxes.csv"));
     EXPECT_EQ(number(*db, "SELECT count(*) FROM study WHERE state = 'finished'"), 1);
