@@ -8,6 +8,11 @@ namespace topple::mbs {
 
 struct Hull;
 
+/// Of a box, in its frame; corner 0 to 7, a bit for each axis [m].
+inline Vec3 corner_of(const Vec3& half, int corner) {
+  return {corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y, corner & 4 ? half.z : -half.z};
+}
+
 /// A contact shape in W.
 struct Solid {
   Shape::Kind kind = Shape::Kind::Box;

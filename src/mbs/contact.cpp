@@ -9,6 +9,7 @@
 #include <numbers>
 #include <span>
 
+#include "mbs/boxes.h"
 #include "mbs/contact_kernel.h"
 #include "mbs/system.h"
 
@@ -88,11 +89,9 @@ double System::calc_contact_stretch(const BodyConstants& body) const {
     const Hull* hull = shape.kind == Shape::Kind::Hull ? &hulls[static_cast<size_t>(shape.hull)] : nullptr;
     for (int corner = 0; corner < count_corners(shape); ++corner) {
       const size_t c = static_cast<size_t>(corner);
-      const Vec3 at = hull != nullptr ? hull->vertices[c]
-                      : shape.kind == Shape::Kind::Box
-                          ? Vec3{corner & 1 ? shape.half.x : -shape.half.x, corner & 2 ? shape.half.y : -shape.half.y,
-                                 corner & 4 ? shape.half.z : -shape.half.z}
-                          : Vec3{};
+      const Vec3 at = hull != nullptr                  ? hull->vertices[c]
+                      : shape.kind == Shape::Kind::Box ? corner_of(shape.half, corner)
+                                                       : Vec3{};
       points.push_back({shape.p_BS + shape.R_BS * at, hull != nullptr ? hull->weights[c] : 1});
     }
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mbs/boxes.h"
 #include "mbs/system.h"
 
 namespace topple::mbs {
@@ -99,8 +100,7 @@ void System::note_sunk_boxes() {
     const GroundBox box = state.ground_box[b];
     double deepest = 0;
     for (int i = 0; i < 8; ++i) {
-      const Vec3 corner{i & 1 ? shape.half.x : -shape.half.x, i & 2 ? shape.half.y : -shape.half.y,
-                        i & 4 ? shape.half.z : -shape.half.z};
+      const Vec3 corner = corner_of(shape.half, i);
       const double height = dot(model.contact.normal, centre + R * (shape.R_BS * corner)) - model.contact.offset;
       deepest = std::max(deepest, -height - std::max(0.0, box.born[i]));
     }

@@ -5,19 +5,11 @@
 #include <span>
 #include <utility>
 
+#include "mbs/boxes.h"
 #include "mbs/contact_kernel.h"
 #include "mbs/system.h"
 
 namespace topple::mbs {
-
-namespace {
-
-/// Of a box, in its frame [m].
-Vec3 corner_of(const Vec3& half, int corner) {
-  return {corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y, corner & 4 ? half.z : -half.z};
-}
-
-}  // namespace
 
 bool System::is_ground_box(size_t b) const {
   const BodyConstants& body = state.body[b];

@@ -12,6 +12,7 @@ extern "C" {
 }
 
 #include "base/error.h"
+#include "mbs/boxes.h"
 
 namespace topple::mbs {
 
@@ -119,8 +120,7 @@ Hull make_hull(const std::vector<Vec3>& points) {
 
 Hull make_box_hull(const Vec3& half) {
   Hull hull;
-  for (int i = 0; i < 8; ++i)
-    hull.vertices.push_back({i & 1 ? half.x : -half.x, i & 2 ? half.y : -half.y, i & 4 ? half.z : -half.z});
+  for (int i = 0; i < 8; ++i) hull.vertices.push_back(corner_of(half, i));
   for (int k = 0; k < 3; ++k)
     for (const double sign : {-1.0, 1.0}) {
       Vec3 n;

@@ -244,10 +244,7 @@ void plane_solid(const Solid& plane, const Solid& other, bool flipped, BoxContac
   if (other.kind == Shape::Kind::Sphere) {
     take(other.p - other.radius * n, 1);
   } else if (other.kind == Shape::Kind::Box) {
-    for (int i = 0; i < 8; ++i)
-      take(other.p + other.R * Vec3{i & 1 ? other.half.x : -other.half.x, i & 2 ? other.half.y : -other.half.y,
-                                    i & 4 ? other.half.z : -other.half.z},
-           1);
+    for (int i = 0; i < 8; ++i) take(other.p + other.R * corner_of(other.half, i), 1);
   } else {
     const Hull& hull = *other.hull;
     const auto place = [&](size_t i) { return other.p + other.R * hull.vertices[i]; };

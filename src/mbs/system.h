@@ -529,9 +529,10 @@ class System {
   int find_mobility(size_t body);
   /// Speed along an axis of a point of a body per force there; the lever is from the centre of mass [1/kg].
   double calc_mobility_along(size_t body, int mobility, const Vec3& lever, const Vec3& axis) const;
+  /// By what points far from the centre of mass raise the square of a contact's frequency, 1 or more (contact.md).
+  double calc_contact_stretch(const BodyConstants&) const;
   /// Stiffness of the points from `first` on by what joints leave of the mobility of the two bodies, and what their
   /// group shall know of it. False: none hold them.
-  double calc_contact_stretch(const BodyConstants&) const;
   bool fit_points(size_t a, size_t b, const Vec3& n, size_t first, const ContactLaw&, ContactGroup&);
   /// Hands that on to the last group.
   void keep_mobility(const ContactGroup& fitted);
