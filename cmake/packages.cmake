@@ -21,6 +21,7 @@ add_library(SuiteSparse::cholmod UNKNOWN IMPORTED)
 set_target_properties(SuiteSparse::cholmod PROPERTIES IMPORTED_LOCATION ${CHOLMOD_LIBRARY}
                                                       INTERFACE_INCLUDE_DIRECTORIES ${CHOLMOD_INCLUDE}
                                                       INTERFACE_LINK_LIBRARIES gomp)  # it is built with OpenMP
+find_library(JEMALLOC_LIBRARY jemalloc)  # without it programs use the C library's allocator
 # Other engines behind the adapter; topple runs without them (docs/engines.md).
 find_package(Simbody QUIET)
 find_package(mujoco QUIET)

@@ -100,9 +100,13 @@ double System::calc_contact_stretch(const BodyConstants& body) const {
     const Vec3 turn = cross(r, n);
     return 1 + dot(turn, body.inverse_inertia * turn) * body.mass;
   };
+  const Mat3& W = body.inverse_inertia;
+  const double trace = W(0, 0) + W(1, 1) + W(2, 2);
   double most = 0;
   Vec3 n;
   for (const Point& p : points) {
+    // no direction has more than the trace of (r x)ᵀ W (r x): 9 over the mass for the corners of a box
+    if (1 + body.mass * (trace * dot(p.r, p.r) - dot(p.r, W * p.r)) <= far) continue;
     // the direction in which it moves most easily, by powers of (r x)ᵀ W (r x)
     Vec3 way{0.6, 0.5, 0.62};
     for (int round = 0; round < 30; ++round) {
