@@ -15,6 +15,8 @@
 
 namespace topple::mbs {
 
+inline constexpr double kContactAngle = 0.18;  // of a contact's swing in a step that the engine chooses, at most [rad]
+
 /// A friction spring at a touching point, as the step before left it.
 struct Stick {
   Vec3 at;    // from the first body's mass centre [m]

@@ -15,6 +15,7 @@ namespace {
 constexpr size_t kMostNoted = 6;     // pairs of bodies
 constexpr double kMostSunken = 0.5;  // share of the thinner shape that they may overlap by
 constexpr double kBegun = 0.01;      // share of it from which on an overlap at the start is told
+constexpr double kMostSwing = 0.5;   // of contact in a set step: impacts then miss percents of their energy [rad]
 
 std::string name_of(const Model& model, size_t b) {
   const std::string& name = model.bodies[b].name;
@@ -159,6 +160,17 @@ void System::note_overlaps_at_start() {
         sunken == 1 ? "a shape reaches" : fmt::format("{} shapes reach", sunken),
         sunken == 1 ? "that of body " : "deepest that of body ", lowest_body, lowest, sunken == 1 ? "it" : "them",
         sunken == 1 ? "it has" : "they have"));
+}
+
+void System::note_swing_of_contact() {
+  const double frequency = calc_contact_frequency(), swing = step * frequency;
+  if (!(options.step > 0) || !(swing > kMostSwing)) return;
+  const Energy e = calc_energy();
+  if (e.contact == 0 && e.contact_loss == 0 && e.friction == 0) return;
+  summary.notes.push_back(fmt::format(
+      "contact swings at up to {:.4g} rad/s, by {:.2g} rad in the set step of {:.3g} s: impacts do not keep "
+      "their energy. A step below {:.2g} s is short enough; where none is set one is chosen",
+      frequency, swing, step, kContactAngle / frequency));
 }
 
 }  // namespace topple::mbs

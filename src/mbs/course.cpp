@@ -305,6 +305,7 @@ Summary Course::finish() {
   out.steps = state.step_index;
   out.energy_error = calc_energy_error();
   out.joint_drift = state.largest_drift;
+  if (s_.options.tells_lost_contact) s_.note_swing_of_contact();
   out.message = std::string(words_of(out.ending)) + " at " + std::to_string(out.time) + " s";
   if (!s_.trouble.empty()) {
     out.message += ": " + s_.trouble;

@@ -27,7 +27,6 @@ namespace {
 
 constexpr double kOverestimate = 1.01;   // of the highest frequency: the iteration stops a little below
 constexpr double kHeld = 1e6;            // inertia of what joints hold, over that of the heaviest body
-constexpr double kContactAngle = 0.18;   // of a contact's swing in a step, at most [rad]
 constexpr double kTouchingSafety = 0.9;  // of the limit of stability that what touches asks for
 
 using Sparse = Eigen::SparseMatrix<double>;

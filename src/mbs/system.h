@@ -612,6 +612,8 @@ class System {
   void note_sunk_boxes();
   /// Of bodies that overlap, and of such that reach below the ground, where contact begins.
   void note_overlaps_at_start();
+  /// At the end of a run that touched something in a set step that is too long for it.
+  void note_swing_of_contact();
   /// Of the shape at its thinnest, infinite for a plane [m].
   double thickness_of(const CompiledShape&) const;
   /// Whether more rows were told to depend on others than do now, or to do so for a while.
