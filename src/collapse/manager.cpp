@@ -346,25 +346,36 @@ void Builder::make_beams() {
       Vec3 low = m.start - half, high = m.end + half;
       low[axis] += z.clear_start, high[axis] -= end;
       const double mass = product::calc_mass(plan, m);
-      const int a = node_at(at), b = node_at(other);
-      // a joint without a column is a piece of the beams that meet in it
-      double kept = mass;
-      for (const auto& [node, face, sign] : {std::tuple{a, low[axis], -1.0}, std::tuple{b, high[axis], 1.0}}) {
-        Assembly& joint = assemblies[static_cast<size_t>(node)];
-        const bool has_column = !joint.parts.empty() && joint.parts.front().member >= 0 &&
-                                member(joint.parts.front().member).kind == MemberKind::Column;
-        if (has_column) continue;
-        const double share = std::min(0.5 * s.height / z.clear_length, kMostInJoint);
-        Part piece = make_part(low, high, mass * share, index);
-        piece.half[axis] = std::max(0.5 * s.width, 0.05);
-        piece.centre[axis] = face + sign * piece.half[axis];
-        joint.parts.push_back(piece);
-        kept -= mass * share;
+      // a joint without a column is a piece of the beams that meet in it, each up to the point of the grid
+      const std::array<int, 2> nodes{node_at(at), node_at(other)};
+      const std::array<double, 2> crossing{z.clear_start, end};
+      std::array<bool, 2> is_loose{};
+      double concrete = z.clear_length;
+      for (size_t side : {0, 1}) {
+        const std::vector<Part>& parts = assemblies[static_cast<size_t>(nodes[side])].parts;
+        is_loose[side] =
+            parts.empty() || parts.front().member < 0 || member(parts.front().member).kind != MemberKind::Column;
+        if (is_loose[side]) concrete += crossing[side];
       }
+      const double inside = std::min(0.5 * s.height, kMostInJoint * z.clear_length), density = mass / concrete;
+      double kept = mass;
+      for (size_t side : {0, 1}) {
+        if (!is_loose[side]) continue;
+        const double edge = side == 0 ? low[axis] + inside : high[axis] - inside;
+        Vec3 from = low, to = high;
+        from[axis] = side == 0 ? m.start[axis] : edge;
+        to[axis] = side == 0 ? edge : m.end[axis];
+        (side == 0 ? low : high)[axis] = edge;
+        const double piece = density * (inside + crossing[side]);
+        assemblies[static_cast<size_t>(nodes[side])].parts.push_back(make_part(from, to, piece, index));
+        kept -= piece;
+      }
+      // between them
+      const Part rest = make_part(low, high, kept, index);
       if (along_x) {
-        own_body[index] = add_assembly({m.name, "beam", at.storey, false, {make_part(low, high, kept, index)}});
+        own_body[index] = add_assembly({m.name, "beam", at.storey, false, {rest}});
       } else {
-        put_on_nodes({make_part(low, high, kept, index)}, axis, 0.5 * (low[axis] + high[axis]), a, b);
+        put_on_nodes({rest}, axis, 0.5 * (low[axis] + high[axis]), nodes[0], nodes[1]);
       }
     }
   complain_of_charges_in_joints();

@@ -217,6 +217,40 @@ TEST(Manager, ABeamWithoutColumnBelowEndsInAJointOfItsOwn) {
       std::any_of(b.map.bodies.begin(), b.map.bodies.end(), [](const BodyEntry& e) { return e.name == "N-B1-0"; }));
 }
 
+TEST(Manager, ABeamEndsAtThePointOfTheGridWhereNoColumnIs) {
+  // a cantilever of 2 m along x or y, alone or with a beam across its end: mass centre as by statics, nothing beyond
+  for (const bool along_x : {true, false})
+    for (const bool is_crossed : {false, true}) {
+      const std::string ends = "A = \"0 m\", B = \"2 m\"", wide = "A = \"0 m\", B = \"4 m\"",
+                        one = "1 = \"0 m\", 2 = \"4 m\"", two = "1 = \"0 m\", 2 = \"2 m\"";
+      const std::string beams = along_x ? "\"A1B1\", \"A2B2\", \"A1A2\"" : "\"A1A2\", \"B1B2\", \"A1B1\"",
+                        across = along_x ? ", \"B1B2\"" : ", \"A2B2\"";
+      const product::Plan plan = read(materials() + grid(along_x ? ends : wide, along_x ? one : two, 1) +
+                                      "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\nat = [" +
+                                      beams + (is_crossed ? across : "") + "]\n[preparation]\nremoved = [\"" +
+                                      (along_x ? "C-B*-0" : "C-*2-0") + "\"]\n" + analysis());
+      const Built b = build(plan);
+      expect_exact_mass(plan, b);
+      const int axis = along_x ? 0 : 1;
+      double moment = 0, by_hand = 0, farthest = 0;
+      for (size_t i = 0; i < b.model.bodies.size(); ++i) {
+        moment += b.model.bodies[i].mass * b.model.bodies[i].X_WB.p[axis];
+        for (const record::BoxShape& s : b.map.bodies[i].shapes)
+          farthest = std::max(farthest, b.model.bodies[i].X_WB.p[axis] + s.X_BS.p[axis] + s.half[axis]);
+      }
+      for (const product::Member& m : plan.members) {
+        if (m.removed) continue;
+        // concrete of a beam begins at the face of a column
+        const double face = m.kind == product::MemberKind::Beam && std::abs(m.end[axis] - m.start[axis]) > 1
+                                ? (along_x ? 0.15 : 0.2)
+                                : 0;
+        by_hand += product::calc_mass(plan, m) * 0.5 * (m.start[axis] + face + m.end[axis]);
+      }
+      EXPECT_NEAR(moment, by_hand, 1e-9 * by_hand) << along_x << is_crossed;
+      EXPECT_NEAR(farthest, is_crossed ? 2.15 : 2, 0.02) << along_x << is_crossed;
+    }
+}
+
 TEST(Manager, SaysOnceOfAChargeThatItLiesTooHighAndWhere) {
   std::string text = house(charge("C-A*-0"));
   text.replace(text.find("position = \"1 m\""), 16, "position = \"2.5 m\"");
