@@ -634,6 +634,7 @@ void Builder::connect_cable(const product::Cable& c) {
   const Vec3 p_W = m.start + share * (m.end - m.start);
   int body = -1;
   if (m.kind == MemberKind::Shaft) {
+    body = shafts[c.member].joints.empty() ? -1 : shafts[c.member].joints.front().below;  // a stump
     for (const ShaftJoint& joint : shafts[c.member].joints)
       if (joint.at <= c.position) body = joint.above;
   } else if (m.kind == MemberKind::Column) {

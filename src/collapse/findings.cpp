@@ -356,24 +356,24 @@ Standing add_stability(const Context& c) {
   return out;
 }
 
-/// Rings of shafts without bars that lie farther from where the shaft stood than it was high.
+/// Rings of shafts without bars that lie farther from where the shaft stood than it was high and wide.
 void add_rolling_rings(const Context& c) {
   const size_t last = c.r.time.size() - 1;
   for (const product::Member& m : c.plan.members) {
     if (m.kind != product::MemberKind::Shaft || m.removed) continue;
     const product::Shaft& s = c.plan.shafts[static_cast<size_t>(m.shaft)];
     if (s.as_outer > 0 || s.as_inner > 0) continue;
-    const double height = m.end.z - m.start.z;
+    const double reach = m.end.z - m.start.z + s.diameter_foot;
     int count = 0;
     for (size_t b = 0; b < c.r.bodies.size(); ++b) {
       const float* at = &c.r.position[3 * (last * c.r.bodies.size() + b)];
-      if (c.r.bodies[b].name.starts_with(m.name + "/") &&
-          std::hypot(at[0] - m.start.x, at[1] - m.start.y) > height + s.diameter_foot)
+      if (c.r.bodies[b].name.starts_with(m.name + "/") && std::hypot(at[0] - m.start.x, at[1] - m.start.y) > reach)
         ++count;
     }
     if (count == 0) continue;
-    std::string text = fmt::format("Rings of {} that lie farther from where it stood than it was high ({:.1f} m): {}.",
-                                   m.name, height, count);
+    std::string text =
+        fmt::format("Rings of {} that lie farther from where it stood than it was high and wide ({:.1f} m): {}.",
+                    m.name, reach, count);
     text +=
         " A shaft without bars comes apart as it falls, and its rings are rigid: they roll and tumble on where real "
         "ones shatter.";
@@ -424,7 +424,7 @@ void add_direction(const Context& c, const Mechanism& m) {
         " The plan asks for a fall along a diagonal of the grid: heads of ground columns turn about {} here, and about "
         "{} where the planned azimuth lies beyond the diagonal. Compare both.",
         c.map.hinge_about_y ? 'y' : 'x', c.map.hinge_about_y ? 'x' : 'y');
-  c.add("azimuth", heading, title, text, m.azimuth, "rad");
+  c.add("azimuth", heading, title, text, m.azimuth < 0 ? m.azimuth + 2 * std::numbers::pi : m.azimuth, "rad");
 }
 
 Reach add_debris(const Context& c, const Mechanism& m) {

@@ -12,6 +12,7 @@
 #include "base/words.h"
 #include "collapse/builder.h"
 #include "nearfield/shell.h"
+#include "record/told.h"
 
 namespace topple::collapse {
 
@@ -51,7 +52,12 @@ std::vector<Level> find_levels(const product::Plan& plan, int index) {
       else
         same->height = std::max(same->height, c.destroyed_length);
     }
-  for (const product::Weakening& w : plan.members[static_cast<size_t>(index)].weakenings) {
+  // the highest cut of a level first, whatever the order in the plan
+  std::vector<product::Weakening> cuts = plan.members[static_cast<size_t>(index)].weakenings;
+  std::stable_sort(cuts.begin(), cuts.end(), [](const product::Weakening& a, const product::Weakening& b) {
+    return a.height != b.height ? a.height > b.height : a.at < b.at;
+  });
+  for (const product::Weakening& w : cuts) {
     const auto is_in = [&](const Level& l) { return w.at >= l.low() - 0.01 && w.at <= l.high() + 0.01; };
     if (std::any_of(out.begin(), out.end(), [&](const Level& l) { return l.is_mouth && is_in(l); })) continue;
     const auto same =
@@ -263,7 +269,7 @@ void Builder::make_shaft(int index) {
   // levels: the foot or a mouth above a rigid stump, other mouths and cuts, and between them as far apart as wanted
   const std::vector<Level> levels = find_levels(plan, index);
   for (size_t i = 1; i < levels.size(); ++i)
-    if (levels[i].low() < levels[i - 1].high() + kLeastRing) {
+    if (levels[i].low() < levels[i - 1].high() + kLeastRing - kSameLevel) {
       complain_of_charge(index, levels[i].at,
                          fmt::format("the mouths or cuts at {:.2f} m and {:.2f} m are too near to each other",
                                      levels[i - 1].at, levels[i].at),
@@ -275,7 +281,7 @@ void Builder::make_shaft(int index) {
   std::vector<double> fixed;
   if (!has_stump) fixed.push_back(0);
   for (const Level& l : levels) {
-    if (l.high() > H - kLeastRing || (!has_stump && l.low() < 0.1)) {
+    if (l.high() > H - kLeastRing + kSameLevel || (!has_stump && l.low() < 0.1 - kSameLevel)) {
       complain_of_charge(index, l.at,
                          fmt::format("a mouth or cut at {:.2f} m leaves nothing of the shaft on one side", l.at));
       return;
@@ -557,14 +563,13 @@ void Builder::note_mouth(const Member& m, const Shaft& s, const ShaftModel& shaf
       plan.cables, [&](const product::Cable& x) { return &member(x.member) == &m && x.position > joint.at; });
   double degrees = 0;
   for (const nearfield::RingSector& x : left.sectors) degrees += x.concrete > 0 ? x.angle() / unit::deg : 0;
-  const double towards = std::abs(std::round(wrap(way + 1e-9) / unit::deg));
   map.notes.push_back(
       {"The mouth of " + m.name,
        fmt::format("The mouth of {} at {:.1f} m leaves {:.0f} deg of the ring. The weight of {} MN above it turns "
-                   "with {} MNm towards {:.0f} deg about the centroid of what is left, {:.2f} m off the axis, which "
+                   "with {} MNm towards {} about the centroid of what is left, {:.2f} m off the axis, which "
                    "resists with {} MNm at most: it {}.",
-                   m.name, joint.at, degrees, decimal_words(stays * 1e-6, 2), decimal_words(moment * 1e-6, 2), towards,
-                   off, decimal_words(tipping.most() * 1e-6, 2), verdict)});
+                   m.name, joint.at, degrees, decimal_words(stays * 1e-6, 2), decimal_words(moment * 1e-6, 2),
+                   record::tell_azimuth(way), off, decimal_words(tipping.most() * 1e-6, 2), verdict)});
   if (is_pulled) map.notes.back().text += " Cables are not counted in that.";
 }
 

@@ -86,6 +86,30 @@ TEST(Shaft, TheOrderOfTwoCutsAtALevelChangesNothing) {
   }
 }
 
+TEST(Shaft, TheHighestOfTwoCutsMakesTheLevelInAnyOrder) {
+  const auto cut = [](const std::string& at, const std::string& azimuth, const std::string& height) {
+    return "[[preparation.weaken]]\nmembers = \"tower\"\nat = \"" + at + "\"\nazimuth = \"" + azimuth +
+           "\"\nopening = \"60 deg\"\nheight = \"" + height + "\"\ncut_concrete = 0.5\ncut_bars = 0.5\n";
+  };
+  const std::string low = cut("20 m", "0 deg", "0.1 m"), high = cut("20.04 m", "180 deg", "2 m");
+  const Built a(tower(slender + strong, low + high, "1 s")), b(tower(slender + strong, high + low, "1 s"));
+  ASSERT_EQ(a.model.elements.size(), b.model.elements.size());
+  for (size_t e = 0; e < a.model.elements.size(); ++e)
+    EXPECT_NEAR(a.model.elements[e].rotational_stiffness.z, b.model.elements[e].rotational_stiffness.z,
+                1e-9 * a.model.elements[e].rotational_stiffness.z)
+        << a.model.elements[e].name;
+}
+
+TEST(Shaft, ACableHoldsItsStumpBelowAMouth) {
+  const Built b(tower(slender + strong,
+                      mouth("2 m", "200 deg") +
+                          "[[cable]]\nmember = \"tower\"\nposition = \"0.5 m\"\nanchor = [\"30 m\", \"0 m\", \"1 m\"]\n"
+                          "stiffness = \"1 MN/m\"\npretension = \"10 kN\"\nstrength = \"200 kN\"\n",
+                      "1 s"));
+  ASSERT_EQ(b.model.cables.size(), 1u);
+  EXPECT_TRUE(b.model.bodies[static_cast<size_t>(b.model.cables[0].a.index)].fixed);
+}
+
 TEST(Shaft, ItsBodiesHaveTheVolumeOfTheRing) {
   // 50 kN of a platform have none
   const Built b(
@@ -693,7 +717,8 @@ TEST(ShaftPhysics, RingsWithoutBarsThatRollOnAreWarnedOf) {
   const record::Finding f = told("15 s");
   EXPECT_EQ(f.status, record::Status::Warning);
   EXPECT_THAT(f.text,
-              testing::StartsWith("Rings of tower that lie farther from where it stood than it was high (20.0 m): "));
+              testing::StartsWith("Rings of tower that lie farther from where it stood than it was high and wide ("
+                                  "22.0 m): "));
   EXPECT_GE(f.value, 1);
 }
 
