@@ -69,18 +69,17 @@ class Blasting {
         table.error("E403", table.place_of("members"), m.name + " is taken out in the preparation",
                     "leave it out here, or keep it standing");
       const double low = charge.position - charge.destroyed_length / 2, high = low + charge.destroyed_length;
-      constexpr double slack = 1e-9;  // round-off [m]
-      if ((low < -slack || high > calc_length(m) + slack) && !std::exchange(is_outside, true))
+      if ((low < -round_off || high > calc_length(m) + round_off) && !std::exchange(is_outside, true))
         table.error("E405", table.place_of("position"),
                     "the destroyed length, " + in_metres(low) + " to " + in_metres(high) + ", reaches out of " + m.name,
                     "it is " + in_metres(calc_length(m)) + " long; position is the middle of the destroyed length");
       for (const Fired& other : fired_[static_cast<size_t>(index)]) {
-        if (!(low < other.high - slack && other.low < high - slack) || is_overlapping) continue;
+        if (!(low < other.high - round_off && other.low < high - round_off) || is_overlapping) continue;
         const double apart = std::abs(std::remainder(other.azimuth - charge.azimuth, 2 * pi));
         const double least = 0.5 * (other.opening + charge.opening);
         if (std::isnan(apart - least)) continue;  // complained of
         if (m.kind == MemberKind::Shaft && apart >= least - 1e-9) {
-          if (std::abs(low - other.low) < slack && std::abs(high - other.high) < slack) continue;
+          if (std::abs(low - other.low) < round_off && std::abs(high - other.high) < round_off) continue;
           is_overlapping = true;
           table.error("E404", table.place_of("position"),
                       m.name + " has another charge beside this one, not at the same height",
@@ -131,7 +130,7 @@ void check_times(Reading& reading, const std::vector<const Node*>& nodes, const 
     return entry ? entry->value.place : nodes[i]->place;
   };
   for (size_t i = 1; i < stages.size(); ++i)
-    if (stages[i].time <= stages[i - 1].time)
+    if (stages[i].time <= stages[i - 1].time + round_off)
       complaints.error("E402", place_of_time(i),
                        "stage[" + std::to_string(i) + "]: time: is not after the stage before it",
                        "stages are given in the order in which they fire");
@@ -255,7 +254,7 @@ void read_cables(Reading& reading, TableReader& root) {
           table.error("E307", table.place_of("member"), m.name + " is neither a column nor a beam nor a shaft");
         } else if (m.removed) {
           table.error("E403", table.place_of("member"), m.name + " is taken out in the preparation");
-        } else if (c.position > calc_length(m)) {
+        } else if (c.position > calc_length(m) + round_off) {
           table.error("E306", table.place_of("position"), "position: lies beyond the end of " + m.name,
                       "it is " + in_metres(calc_length(m)) + " long");
         } else if (anchor && norm(m.start + (c.position / calc_length(m)) * (m.end - m.start) - c.anchor) < unit::mm) {

@@ -254,7 +254,6 @@ void check_openings(const Builder& builder, const Key& key, const Draft& draft, 
   const bool is_along_x = row_a != row_b;
   const double left = calc_half_column(builder, s, row_a, frame_a, is_along_x);
   const double right = calc_length(m) - calc_half_column(builder, s, row_b, frame_b, is_along_x);
-  constexpr double slack = 1e-9;  // round-off of sums of lengths [m]
   Complaints& complaints = builder.reading.complaints;
   for (size_t i = 0; i < m.openings.size(); ++i) {
     const Opening& o = m.openings[i];
@@ -264,13 +263,13 @@ void check_openings(const Builder& builder, const Key& key, const Draft& draft, 
     char room[120];
     std::snprintf(room, sizeof room, "between its columns from %.3g m to %.3g m, up to %.3g m above the floor", left,
                   right, m.height);
-    if (o.left < left - slack || o.left + o.width > right + slack || o.sill + o.height > m.height + slack)
+    if (o.left < left - round_off || o.left + o.width > right + round_off || o.sill + o.height > m.height + round_off)
       complaints.error("E306", place, "opening[" + std::to_string(i) + "]: reaches out of " + m.name,
                        std::string("the wall stands ") + room);
     for (size_t j = 0; j < i; ++j) {
       const Opening& p = m.openings[j];
-      if (o.left < p.left + p.width - slack && p.left < o.left + o.width - slack &&
-          o.sill < p.sill + p.height - slack && p.sill < o.sill + o.height - slack)
+      if (o.left < p.left + p.width - round_off && p.left < o.left + o.width - round_off &&
+          o.sill < p.sill + p.height - round_off && p.sill < o.sill + o.height - round_off)
         complaints.error("E306", place,
                          "opening[" + std::to_string(i) + "]: overlaps opening[" + std::to_string(j) + "]");
     }
@@ -535,7 +534,7 @@ void read_preparation(Reading& reading, TableReader& root) {
         weaken.error("E403", weaken.place_of("members"), m.name + " is taken out in the preparation");
         break;
       }
-      if (w.at > calc_length(m)) {
+      if (w.at > calc_length(m) + round_off) {
         char length[32];
         std::snprintf(length, sizeof length, "%.4g m", calc_length(m));
         weaken.error("E306", weaken.place_of("at"), "at: lies beyond the end of " + m.name,

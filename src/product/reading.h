@@ -61,6 +61,7 @@ Plan read_plan_document(const Node& document, const std::string& name, Complaint
 
 /// Whether bars find room side by side, their axes from -extent to extent.
 bool have_room(int count, double diameter, double extent);
+inline constexpr double round_off = 1e-9;  // of lengths [m] and times [s] in other units, and of their sums
 /// Of a section, what its bars take at most.
 inline constexpr double most_steel = 0.15;
 
