@@ -45,7 +45,8 @@ CompiledCharacteristic compile_characteristic(const Characteristic& from) {
       c.area.assign(c.x.size(), 0);
       for (size_t i = 1; i < c.x.size(); ++i)
         c.area[i] = c.area[i - 1] + 0.5 * (c.f[i] + c.f[i - 1]) * (c.x[i] - c.x[i - 1]);
-      c.is_zero = std::all_of(c.f.begin(), c.f.end(), [](double f) { return f == 0; });
+      for (const double f : c.f) c.most = std::max(c.most, std::abs(f));
+      c.is_zero = c.most == 0;
       c.area_at_zero = c.x.empty() ? 0 : calc_area(c, 0);
       break;
   }
@@ -68,6 +69,22 @@ double calc_force(const CompiledCharacteristic& c, double x) {
       const size_t i = find_interval(c.x, x);
       return c.f[i] + (x - c.x[i]) / (c.x[i + 1] - c.x[i]) * (c.f[i + 1] - c.f[i]);
     }
+  }
+  return 0;
+}
+
+double calc_round_off(const CompiledCharacteristic& c, double x) {
+  constexpr double share = 1e-15;
+  switch (c.kind) {
+    case Characteristic::Kind::Linear:
+      return share * std::abs(c.rate * x);
+    case Characteristic::Kind::Polynomial: {
+      double sum = 0;
+      for (size_t i = c.c.size(); i-- > 0;) sum = sum * std::abs(x) + std::abs(c.c[i]);
+      return share * sum;
+    }
+    case Characteristic::Kind::Table:
+      return share * c.most;
   }
   return 0;
 }

@@ -15,6 +15,7 @@ struct CompiledCharacteristic {
   std::vector<double> x, f;     // Table
   std::vector<double> area;     // Table: integral from x[0] to x[i]
   double area_at_zero = 0;      // Table: integral from x[0] to 0
+  double most = 0;              // Table: largest magnitude
   bool is_zero = true;          // 0 everywhere: nothing to evaluate
   bool has_bound_slope = true;  // false: a polynomial of second degree or more
 };
@@ -22,6 +23,8 @@ struct CompiledCharacteristic {
 CompiledCharacteristic compile_characteristic(const Characteristic&);
 
 double calc_force(const CompiledCharacteristic&, double x);
+/// What round-off may make of it.
+double calc_round_off(const CompiledCharacteristic&, double x);
 /// Derivative; at a corner of a table that of the side towards larger x.
 double calc_slope(const CompiledCharacteristic&, double x);
 /// Integral of the law from 0 to x: the energy that a spring stores.

@@ -27,11 +27,12 @@ bool find_rate(const CompiledCharacteristic& c, double q, double s, double& r) {
     r = s;
     return true;
   }
-  if (lack(low) > 0 || lack(high) < 0) return false;
+  const auto round_off = [&](double x) { return 1e-15 * std::abs(s) + q * calc_round_off(c, x); };
+  if (lack(low) > round_off(low) || lack(high) < -round_off(high)) return false;
   if (!(r >= low && r <= high)) r = 0.5 * (low + high);
   for (int round = 0; round < 200; ++round) {
     const double g = lack(r);
-    if (g == 0) return true;
+    if (std::abs(g) <= 0.5 * round_off(r)) return true;
     (g < 0 ? low : high) = r;
     const double slope = 1 + q * calc_slope(c, r);
     double next = slope > 0 ? r - g / slope : low - 1;

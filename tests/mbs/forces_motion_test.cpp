@@ -350,6 +350,35 @@ TEST(LoadPhysics, FollowsItsBody) {
   EXPECT_NEAR(std::log2(off[0] / off[1]), 2, 0.1);
 }
 
+TEST(DamperPhysics, DryFrictionStopsAtAnySpeed) {
+  // a table that rises to the friction within 1e-5 m/s: 100 kg at 1 m/s stop after v^2 / (2 a); next to rest its force
+  // is known to round-off of the largest only
+  for (const double friction : {97.0, 100.0, 103.0, 350.0})
+    for (const double step : {1e-3, 7e-4, 1e-4}) {
+      Model m;
+      m.contact.ground = m.contact.bodies = false;
+      m.gravity = {};
+      add_body(m, test::make_box("b", 100, {0.1, 0.1, 0.1}, {0, 0, 0}));
+      m.bodies[0].v_WB = {1, 0, 0};
+      SpringDamper s;
+      s.name = "friction";
+      s.a = kGround, s.b = {0};
+      s.p_A = {-10, 0, 0};
+      s.free_length = 10;
+      s.damper.kind = Characteristic::Kind::Table;
+      s.damper.x = {-1, -1e-5, 0, 1e-5, 1};
+      s.damper.f = {-1.01 * friction, -friction, 0, friction, 1.01 * friction};
+      m.springs.push_back(s);
+      double x = 0, v = 1;
+      Options o = options_of(2.5, step);
+      o.on_frame = [&](const View& view) { x = view.X_WB[0].p.x, v = view.v_WB[0].x; };
+      const Summary end = run(m, o);
+      ASSERT_EQ(end.ending, Summary::Ending::TimeLimit) << friction << " N, " << step << " s: " << end.message;
+      EXPECT_LT(std::abs(v), 1e-4);
+      EXPECT_NEAR(x, 100 / (2 * 1.005 * friction), 0.02 * 100 / (2 * friction)) << friction << " " << step;
+    }
+}
+
 TEST(DamperPhysics, TheFirstRowHasTheVelocitiesOfTheStart) {
   // a spring, a bushing that turns and the hinge behind it, with dampers that stop their bodies within some steps
   Model m;
