@@ -620,6 +620,11 @@ class DeadLoad {
   void find_most_loaded();
   /// Of the last evaluation: tangents where they lead nearer, else secants, which go there slowly but surely.
   void find_cracks(bool by_tangents);
+  /// What is unbalanced, over the weight. Iterations leave forces in balance however far joints are open, so what would
+  /// close them counts, too, by a hundredth.
+  double calc_left() const {
+    return std::max(unbalanced_, 0.01 * hold_ * std::max(0.0, gap_left_ - open_gap_) / weight_);
+  }
   std::string describe_failure(bool has_diverged);
   /// What the most loaded element would bear without limits.
   std::string tell_most_loaded() const;
@@ -637,6 +642,8 @@ class DeadLoad {
   const Unknowns& u_;
   const std::vector<ZoneState> virgin_, virgin_rotational_;
   double weight_ = 1, penalty_ = 1;
+  double open_gap_ = -1;           // need not close: repeated constraints meet but for the last digits [m, rad]
+  double hold_ = 0;                // stiffness by which an open joint counts as a force [N/m]
   double share_ = 1;               // of an iteration's way that is gone
   double most_turn_ = kUnlimited;  // of a body in an iteration [rad]
   bool hangs_ = false;             // reactions of joints count as stiffness
@@ -649,6 +656,7 @@ class DeadLoad {
   Vector pushed_;                         // unbalanced, and gaps pushed back
   double unbalanced_ = 0, gap_left_ = 0;  // over the weight; [m, rad]
   size_t most_unbalanced_ = 0;            // body
+  size_t most_open_ = 0;                  // joint
   std::vector<Overload> overloads_;       // without limits, the largest first
   bool measures_loads_ = false;           // laws have no limits
   size_t most_loaded_ = 0;                // element, without limits
@@ -783,7 +791,8 @@ void DeadLoad::find_unbalanced() {
       double& held = multiplier_[j][static_cast<size_t>(i)];
       held -= share_ * penalty_ * gap[i];
       pushed_back_[static_cast<Eigen::Index>(6 * j) + i] = -share_ * penalty_ * gap[i];
-      gap_left_ = std::isfinite(gap[i]) ? std::max(gap_left_, std::abs(gap[i])) : kUnlimited;
+      if (const double open = std::isfinite(gap[i]) ? std::abs(gap[i]) : kUnlimited; open > gap_left_)
+        gap_left_ = open, most_open_ = j;
       const auto load = [&](Vector& on, double f) {
         for (int k = 0; k < u_.each; ++k) {
           const int c = u_.coordinate(k);
@@ -797,6 +806,8 @@ void DeadLoad::find_unbalanced() {
       if (i >= s_.joints[j].lines) js.moment += held * row.wb;
     }
   }
+  constexpr double wider = 10;  // than at the start
+  if (open_gap_ < 0) open_gap_ = wider * gap_left_;
   Eigen::Index most = 0;
   r.cwiseAbs().maxCoeff(&most);
   // a largest one does not see what is no number
@@ -897,6 +908,10 @@ std::string DeadLoad::describe_failure(bool has_diverged) {
   std::string message = words;
   if (has_diverged) {
     message += "grew without bound";
+  } else if (unbalanced_ < calc_left()) {
+    message =
+        fmt::format("no dead-load equilibrium after {} iterations: a gap of {:.2g} m or rad is left in joint \"{}\"",
+                    s_.summary.equilibrium_iterations, gap_left_, s_.model.joints[most_open_].name.substr(0, 60));
   } else {
     std::snprintf(words, sizeof words, "is %.2g times the weight", unbalanced_);
     message = message + words + ", of body \"" + s_.model.bodies[most_unbalanced_].name.substr(0, 60) + "\"";
@@ -924,8 +939,7 @@ bool DeadLoad::find(std::string& message) {
     return false;
   }
   weight_ = calc_weight();
-  // joints as stiff as the stiffest body is held: more would turn round-off of places into larger forces and save no
-  // iteration
+  // joints as stiff as the stiffest body is held: more would turn round-off of places into larger forces
   {
     assembly_.make_stiffness(false, weight_).move_to(first_);
     for (Eigen::Index i = 0; i < first_.rows(); ++i) penalty_ = std::max(penalty_, first_.coeff(i, i));
@@ -935,6 +949,7 @@ bool DeadLoad::find(std::string& message) {
   for (const int b : assembly_.free_bodies()) extent = std::max(extent, norm(s_.state.p[static_cast<size_t>(b)]));
   // where joints alone hold: the weight opens them by a thousandth at first
   penalty_ = std::max(penalty_, 1e3 * weight_ / extent);
+  hold_ = penalty_;
   const double good_enough = std::max(1e-8, 1e-15 * penalty_ * extent / weight_);
 
   const Place begun = find_place();
@@ -957,10 +972,23 @@ bool DeadLoad::find(std::string& message) {
     if (end != End::Diverged) break;
   }
   if (end == End::Found || end == End::Mechanism) return end == End::Found;
-  // what turns far, where nothing has limits: on short turns
   const bool has_limits = std::any_of(s_.model.elements.begin(), s_.model.elements.end(),
                                       [](const ZoneElement& e) { return !e.stations.empty(); }) ||
                           !s_.model.rotational_elements.empty();
+  // by that stiffness joints on short levers close slowly
+  const bool is_open = unbalanced_ < good_enough;
+  if (end == End::None && !s_.joints.empty() && (is_open || !has_limits)) {
+    share_ = 1;
+    for (const double stiffer : {1e2, 1e4, 1e6}) {
+      penalty_ = stiffer * hold_;
+      begin_again();
+      std::string other;
+      if (search(good_enough, other) == End::Found) return true;
+    }
+    if (is_open) return false;
+    penalty_ = hold_;
+  }
+  // what turns far, where nothing has limits: on short turns
   if (!has_limits) {
     most_turn_ = 0.2;
     for (const bool hangs : {true, false})
@@ -1041,9 +1069,10 @@ DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
     if (measures_loads_ && unbalanced_ < 1e-6 && gap_left_ < 1e-6) return End::Found;
     if (!s_.ignores_limits && unbalanced_ < 1e-11 && gap_left_ < 1e-11) break;
     // round-off ends the improvement of very stiff models earlier
-    idle = unbalanced_ < 0.5 * best ? 0 : idle + 1;
-    best = std::min(best, unbalanced_);
-    if (round == most || (idle > 2 && unbalanced_ < good_enough)) break;
+    const double left = calc_left();
+    idle = left < 0.5 * best ? 0 : idle + 1;
+    best = std::min(best, left);
+    if (round == most || (idle > 2 && left < good_enough)) break;
     if (steps == Steps::Accelerated) {
       if (++accelerated < most_accelerated && (std::isfinite(unbalanced_) || !acceleration_.is_plain())) {
         move_accelerated();
@@ -1085,7 +1114,7 @@ DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
     }
     ++round;
   }
-  if (!has_diverged && unbalanced_ < good_enough) return End::Found;
+  if (!has_diverged && calc_left() < good_enough) return End::Found;
   constexpr double boundless = 1e6;
   has_diverged = has_diverged || !(unbalanced_ < boundless);
   message = describe_failure(has_diverged);

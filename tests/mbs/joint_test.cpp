@@ -490,6 +490,59 @@ TEST(JointPhysics, AnArmOnASoftSpringFindsItsEquilibrium) {
   }
 }
 
+TEST(JointPhysics, AnEquilibriumHasItsJointsClosed) {
+  // an arm on a hinge, held by a rod on a lever of 0.1 m; a weight hangs from its tip, and a prop stands under it
+  for (const double stiffness : {1e6, 1e8}) {
+    Model m = empty_model();
+    m.gravity = {0, 0, -9.81};
+    add_body(m, test::make_rod("arm", 100, {0, 0, 0}, {2, 0, 0}));
+    add_body(m, test::make_box("weight", 50, {0.1, 0.1, 0.1}, {2, 0, -1}));
+    test::join(m, Joint::Kind::Revolute, kGround, {0}, {0, 0, 0}, test::along({0, 1, 0}), "hinge");
+    Joint rod;
+    rod.kind = Joint::Kind::Distance;
+    rod.name = "rod";
+    rod.parent = kGround;
+    rod.child = {0};
+    rod.X_PF.p = {-1, 0, 0.1};
+    rod.X_CM.p = {-0.5, 0, 0.1};
+    add_joint(m, rod);
+    Bushing hanger;
+    hanger.a = {0}, hanger.b = {1};
+    hanger.X_AF.p = {1, 0, -1};
+    for (int k = 0; k < 6; ++k) hanger.spring[k].rate = k < 3 ? stiffness : 1e3;
+    m.bushings.push_back(hanger);
+    SpringDamper prop;
+    prop.a = kGround, prop.b = {0};
+    prop.p_A = {2, 0, -2}, prop.p_B = {1, 0, 0};
+    prop.free_length = 2;
+    prop.spring.rate = stiffness;
+    m.springs.push_back(prop);
+    Options o = options_of(1e-3, 1e-3);
+    o.equilibrium = true;
+    double pull = 0;
+    o.on_frame = [&](const View& v) {
+      if (v.time == 0) pull = std::abs(calc_quantity({Quantity::Kind::JointForce, 1}, v)[0]);
+    };
+    const Summary s = run(m, o);
+    ASSERT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+    EXPECT_NEAR(pull, (100 * 1 + 50 * 2) * 9.81 / 0.1, 1) << stiffness;
+  }
+}
+
+TEST(JointPhysics, RepeatedConstraintsNeedNotMeetToTheLastDigit) {
+  Model m = empty_model();
+  m.gravity = {0, 0, -9.81};
+  add_body(m, test::make_box("b", 1000, {1, 0.1, 0.1}, {0, 0, 1}));
+  test::join(m, Joint::Kind::Revolute, kGround, {0}, {-1, 0, 1}, test::along({0, 1, 0}), "left");
+  test::join(m, Joint::Kind::Spherical, kGround, {0}, {1, 0, 1}, {}, "right");
+  m.joints[1].X_PF.p.x += 1e-10;
+  Options o = options_of(1e-3, 1e-3);
+  o.equilibrium = true;
+  const Summary s = run(m, o);
+  EXPECT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+  EXPECT_LT(s.equilibrium_iterations, 50);
+}
+
 TEST(JointPhysics, EquilibriumHangsOnNoOrderOfBodies) {
   // the arm alone goes astray and is found on shorter ways; no body beside it may hide that
   double angle[2] = {0, 0};
