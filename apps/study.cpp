@@ -40,7 +40,7 @@ void write_all(std::FILE* out, const std::string& folder, const study::Problem& 
   const std::string path = (std::filesystem::path(folder) / "study.html").string();
   const auto bundle = find_bundle("study.html");
   if (!bundle) {
-    study::remove_result(path);
+    study::remove_result(path, "<!DOCTYPE html>\n<html lang=\"");
     std::fprintf(stderr, "%s\n", no_study_page);
     return;
   }

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -315,8 +317,15 @@ std::string name_of_outcome(const StudyResult& r, int outcome) {
 
 std::vector<std::string> list_unmet_outcomes(const Problem& p, const StudyResult& r) {
   std::vector<std::string> unmet;
-  for (const std::string& name : p.outcomes)
-    if (std::find(r.outcomes.begin(), r.outcomes.end(), name) == r.outcomes.end()) unmet.push_back(name);
+  for (const std::string& name : p.outcomes) {
+    const auto found = std::find(r.outcomes.begin(), r.outcomes.end(), name);
+    // whole runs of a condensed study have named theirs, too
+    const auto is_met = [index = static_cast<int>(found - r.outcomes.begin())](const auto& c) {
+      return c.outcome == index && c.count > 0;
+    };
+    if (found == r.outcomes.end() || std::none_of(r.alpha.classes.begin(), r.alpha.classes.end(), is_met))
+      unmet.push_back(name);
+  }
   return unmet;
 }
 
@@ -623,19 +632,30 @@ std::string write_confirmation_csv(const Problem& p, const StudyResult& r) {
   return text;
 }
 
-void remove_result(const std::string& path) {
+void remove_result(const std::string& path, std::string_view begin) {
   std::error_code failure;
   if (std::filesystem::is_directory(path, failure)) return;
+  {
+    std::ifstream in(path, std::ios::binary);
+    for (const char wanted : begin) {
+      if (wanted == 'N') {
+        if (!std::isdigit(in.peek())) return;
+        while (std::isdigit(in.peek())) in.get();
+      } else if (in.get() != wanted) {
+        return;
+      }
+    }
+  }
   std::filesystem::remove(path, failure);
   if (failure) throw std::runtime_error(path + " holds no longer and cannot be removed: " + failure.message());
 }
 
 std::vector<std::string> write_results(const std::string& folder, const Problem& p, const StudyResult& r) {
   std::vector<std::string> paths;
-  const auto write = [&](const char* name, const std::string& text) {
+  const auto write = [&](const char* name, const std::string& text, std::string_view begin = {}) {
     const std::string path = (std::filesystem::path(folder) / name).string();
     if (text.empty()) {
-      remove_result(path);  // of earlier settings
+      remove_result(path, begin);  // of earlier settings
       return;
     }
     paths.push_back(path);
@@ -644,15 +664,15 @@ std::vector<std::string> write_results(const std::string& folder, const Problem&
   write("results.json", write_results_json(p, r));
   write("membership.csv", write_membership_csv(p, r));
   write("outcomes.csv", write_outcomes_csv(p, r));
-  write("requirement.csv", write_requirement_csv(p, r));
-  write("limits.csv", write_limits_csv(p, r));
+  write("requirement.csv", write_requirement_csv(p, r), "requirement,class,runs,");
+  write("limits.csv", write_limits_csv(p, r), "output,kind,place,");
   write("samples.csv", write_samples_csv(p, r));
-  write("trajectories.csv", write_trajectories_csv(r));
-  write("drivers.csv", write_drivers_csv(p, r));
-  write("boxes.csv", write_boxes_csv(p, r));
-  write("fans.csv", write_fans_csv(p, r));
-  write("debris.csv", write_debris_csv(p, r));
-  write("confirmation.csv", write_confirmation_csv(p, r));
+  write("trajectories.csv", write_trajectories_csv(r), "N,");
+  write("drivers.csv", write_drivers_csv(p, r), "kind,name,input,");
+  write("boxes.csv", write_boxes_csv(p, r), "box,kept,input,");
+  write("fans.csv", write_fans_csv(p, r), "curve,outcome,alpha,");
+  write("debris.csv", write_debris_csv(p, r), "outcome,alpha,x [m],");
+  write("confirmation.csv", write_confirmation_csv(p, r), "output,outcome,alpha,side,");
   return paths;
 }
 

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "study/manager.h"
@@ -58,8 +59,9 @@ double calc_robustness_of(const Problem&, const StudyResult&, std::size_t output
 /// What whole runs say of a condensed study's bounds and outcomes, one row each; empty without such runs.
 std::string write_confirmation_csv(const Problem&, const StudyResult&);
 
-/// Removes a file of results that no longer holds, if it is there. Throws std::runtime_error.
-void remove_result(const std::string& path);
+/// Removes a file of results that no longer holds, if there is one of that name that begins like it (`begin`, where N
+/// stands for a number); others are not ours. Throws std::runtime_error.
+void remove_result(const std::string& path, std::string_view begin);
 /// Writes all of them into a folder, in the place of those of an earlier call: what there is no more is removed.
 /// Returns the paths.
 std::vector<std::string> write_results(const std::string& folder, const Problem&, const StudyResult&);

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "../collapse/plans.h"
@@ -370,6 +372,13 @@ TEST_F(StudyFaults, LeaveAFinishedStudyWhereItsRepetitionIsInterrupted) {
     EXPECT_EQ(read(folder / "out/boxes.csv"), read(folder / "before/boxes.csv"));
     EXPECT_EQ(number(*db, "SELECT count(*) FROM study WHERE state = 'finished'"), 1);
   }
+  // what is exported removes nothing that only has the name of a table
+  std::filesystem::create_directory(folder / "mine");
+  for (const char* name : {"limits.csv", "debris.csv", "trajectories.csv", "confirmation.csv"})
+    std::ofstream(folder / (std::string("mine/") + name)) << "my own data\n";
+  EXPECT_EQ(run({TOPPLE_PROGRAM, "study", "export", folder / "out", "-o", folder / "mine"}), 0);
+  for (const char* name : {"limits.csv", "debris.csv", "trajectories.csv", "confirmation.csv"})
+    EXPECT_EQ(read(folder / (std::string("mine/") + name)), "my own data\n") << name;
   // what is exported replaces nothing of another study
   EXPECT_EQ(run(study("other", "jump", {"--samples", "50"})), 0);
   EXPECT_EQ(run({TOPPLE_PROGRAM, "study", "export", folder / "other", "-o", folder / "out"}), 2);
