@@ -109,6 +109,9 @@ Permissible read_permissible(const std::string& text, const Problem& p) {
                "such as \"r <= 0.3\"; the name of an outcome that has a sign stands in double quotes");
     if (!p.outcomes.empty() && std::find(p.outcomes.begin(), p.outcomes.end(), name) == p.outcomes.end())
       complain_of_name("outcome", name, p.outcomes);
+    if (p.random)
+      complain(fmt::format("\"{}\": a point of random inputs has no outcome", name),
+               fmt::format("ask for its share, which has to be one of the statistics: \"p({}) >= 0.95\"", name));
     out.outcomes.push_back(name);
   }
   return out;

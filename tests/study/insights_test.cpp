@@ -16,6 +16,7 @@
 #include "study/fans.h"
 #include "study/page.h"
 #include "study/permissible.h"
+#include "study/randomness.h"
 #include "study/results.h"
 #include "study/story.h"
 
@@ -212,6 +213,10 @@ TEST(Permissible, ComplainsWithTheNamesThatAreThere) {
   EXPECT_NE(message_of("< 3").find("output"), std::string::npos);
   EXPECT_NE(message_of("r=0.3").find("r <= 0.3"), std::string::npos);
   EXPECT_EQ(message_of("reach_pos_x <= 3"), "nothing");
+  EXPECT_EQ(message_of("topple"), "nothing");
+  p.random = std::make_shared<const Randomness>();
+  EXPECT_NE(message_of("topple").find("p(topple) >= 0.95"), std::string::npos);
+  p.random = nullptr;
   EXPECT_EQ(read_permissible("\"a=b\"", make_small_problem()).outcomes.at(0), "a=b");
   // what has not happened is kept by nothing
   const auto never = make_requirement(read_permissible("other", make_small_problem()), {"z"}, {"falls"});
