@@ -565,6 +565,16 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
           "would have been missed with a probability of 5 %.",
           runs, words_of_most(100 * (1 - std::pow(0.05, 1.0 / spread)), 0) + " %");
     }
+    for (const Confirmation::Run& run : r.confirmation.runs) {
+      if (&r.alpha.archive[static_cast<std::size_t>(run.sample)] != core ||
+          run.whole.state == uncertainty::Result::State::NotRun)
+        continue;
+      const int whole = uncertainty::outcome_of(run.whole);
+      if (whole == at_core) continue;
+      text += fmt::format(" That is of condensed runs: the whole run with these values has the outcome {}.",
+                          quoted(words_of_outcome(r, whole)));
+      status = name_of_outcome(r, whole) == p.asked ? Status::Warning : Status::Bad;
+    }
     if (is_open)
       text += " With the core values parts still moved when the run ended: what it was called then may become another.";
     add("verdict", std::move(text), status);
@@ -586,6 +596,23 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
         fmt::format("In {} of {} runs nothing of the upper block had touched down when they ended, {:.4g} s after the "
                     "last stage or at rest: their outcome, energy and reach are those of that time.",
                     unfinished, runs, p.horizon->after),
+        Status::Warning);
+  long compared = 0, different = 0;
+  for (const Confirmation::Run& run : r.confirmation.runs) {
+    if (run.whole.state == uncertainty::Result::State::NotRun) continue;
+    ++compared;
+    const uncertainty::Sample& condensed = r.alpha.archive[static_cast<std::size_t>(run.sample)];
+    if (uncertainty::outcome_of(run.whole) != uncertainty::outcome_of(condensed.result)) ++different;
+  }
+  if (different > 0)
+    add("confirmation",
+        fmt::format("{} of {} whole runs have another outcome than the condensed runs with the same values.", different,
+                    compared),
+        2 * different >= compared ? Status::Bad : Status::Warning);
+  if (constexpr double most = 3; p.whole && p.horizon && p.horizon->after > most)
+    add("condensed",
+        "Condensed runs hold until about a second behind the touchdown: reaches, heaps and outcomes at rest are not "
+        "theirs. Let the runs end earlier ([fuzzy.search] after), or run the study without --condensed.",
         Status::Warning);
   if (p.horizon)
     add("clock", fmt::format("Times count from the last stage. Runs end at rest or {:.4g} s behind it, when parts may "

@@ -8,11 +8,13 @@
 #include "server.h"
 #include "small_study.h"
 #include "study/results.h"
+#include "study/story.h"
 
 namespace topple::study {
 namespace {
 
 using State = Confirmation::State;
+using record::Status;
 using json = nlohmann::json;
 
 /// The small study as a condensed model; the whole one gives 10 more for z where R > 20 and falls up to R = 8.5.
@@ -72,6 +74,34 @@ TEST(Confirmation, MarksEachBoundByWholeRuns) {
   for (const auto& o : c.outcomes) EXPECT_EQ(o.state, State::Confirmed) << "the most possible runs are far from R = 8";
   EXPECT_LT(c.runs.size(), 60u) << "each sample once";
   for (const auto& run : c.runs) EXPECT_EQ(run.whole.state, uncertainty::Result::State::Done);
+}
+
+TEST(Confirmation, TheVerdictSaysWhatTheWholeRunOfTheCoreWas) {
+  const Folder folder;
+  const Problem p = make_problem(20);
+  const RunnerFactories others = {{"small", [](const std::string& definition) -> Runner {
+                                     const bool is_whole = json::parse(definition).at("identity").contains("whole");
+                                     return [is_whole](auto points, const auto& give, const auto& cancel) {
+                                       for (std::size_t i = 0; i < points.size() && !cancel; ++i) {
+                                         Answer a = calc_small(points[i]);
+                                         if (a.kind == Answer::Kind::Done) a.outcome = is_whole ? "sinks" : "holds";
+                                         give(i, a);
+                                       }
+                                     };
+                                   }}};
+  const auto find = [](const std::vector<Sentence>& list, const std::string& id) {
+    for (const Sentence& s : list)
+      if (s.id == id) return s;
+    return Sentence{};
+  };
+  const std::vector<Sentence> told = tell(p, run_study(p, others, make_options(folder / "a"), {}, {}));
+  EXPECT_NE(find(told, "verdict").text.find("the whole run with these values has the outcome \"sinks\""),
+            std::string::npos)
+      << find(told, "verdict").text;
+  EXPECT_EQ(find(told, "verdict").status, Status::Bad);
+  EXPECT_EQ(find(told, "confirmation").status, Status::Bad);
+  const std::vector<Sentence> same = tell(p, run_study(p, make_factories(), make_options(folder / "b"), {}, {}));
+  EXPECT_EQ(find(same, "verdict").text.find("whole run"), std::string::npos);
 }
 
 TEST(Confirmation, SaysWhatItsLimitLeftOut) {

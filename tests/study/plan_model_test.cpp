@@ -67,7 +67,12 @@ TEST(PlanModel, IsAnotherModelForAnotherPlanOrAnotherQuestion) {
 TEST(PlanModel, NamesClassesThatNoRunHasHad) {
   const Problem problem = make_plan_problem(read_small(strengths), quick());
   StudyResult r;
-  r.outcomes = {"early", "topple"};
+  r.outcomes = {"early", "topple", "vertical"};  // the last by whole runs of a condensed study alone
+  for (const int outcome : {0, 1}) {
+    uncertainty::ClassBounds c;
+    c.outcome = outcome, c.count = 3;
+    r.alpha.classes.push_back(c);
+  }
   const std::vector<std::string> unmet = list_unmet_outcomes(problem, r);
   EXPECT_EQ(unmet.size(), plan_outcomes().size() - 2);
   EXPECT_THAT(unmet, testing::IsSupersetOf({"vertical", "partial", "stands"}));
