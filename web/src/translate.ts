@@ -48,7 +48,7 @@ function makeSentence([english, translated]: readonly [string, string]): Sentenc
     const isQuoted = pieces[i - 1]?.endsWith('"') === true && pieces[i + 1]?.startsWith('"') === true;
     isKept.push(piece === "{a}");
     isList.push(piece === "{l}" || piece === "{v}");
-    const any = piece === "{*}" || piece === "{a}" || (isQuoted && piece === "{}") ? ".+?" : piece === "{w}" || piece === "{v}" ? "[^,;]+?" : piece === "{n}" ? "[^\\s,;:]+" : "(?:(?![;.] ).)+?";
+    const any = piece === "{*}" || piece === "{a}" || (isQuoted && piece === "{}") ? ".+?" : piece === "{w}" || piece === "{v}" ? "(?:(?![.] )[^,;])+?" : piece === "{n}" ? "[^\\s,;:]+" : "(?:(?![;.] ).)+?";
     pattern += `(${isNumber[isNumber.length - 1] === true ? number : any})`;
     loose += `(${isNumber[isNumber.length - 1] === true ? number : piece === "{}" ? ".+?" : any})`;
   });
