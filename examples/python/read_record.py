@@ -17,6 +17,8 @@ def main(path):
     with h5py.File(path) as record:
         print(record["provenance/title"].asstr()[()])
         time = record["frames/time"][:]
+        if len(time) == 0:
+            sys.exit(f"no frames: {record['ending/text'].asstr()[()]}")
         print(f"{len(time)} frames from {time[0]:.2f} s to {time[-1]:.2f} s: {record['ending/text'].asstr()[()]}")
 
         # the findings, as the program prints them
