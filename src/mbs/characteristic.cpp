@@ -45,8 +45,7 @@ CompiledCharacteristic compile_characteristic(const Characteristic& from) {
       c.area.assign(c.x.size(), 0);
       for (size_t i = 1; i < c.x.size(); ++i)
         c.area[i] = c.area[i - 1] + 0.5 * (c.f[i] + c.f[i - 1]) * (c.x[i] - c.x[i - 1]);
-      for (const double f : c.f) c.most = std::max(c.most, std::abs(f));
-      c.is_zero = c.most == 0;
+      c.is_zero = std::all_of(c.f.begin(), c.f.end(), [](double f) { return f == 0; });
       c.area_at_zero = c.x.empty() ? 0 : calc_area(c, 0);
       break;
   }
@@ -83,8 +82,11 @@ double calc_round_off(const CompiledCharacteristic& c, double x) {
       for (size_t i = c.c.size(); i-- > 0;) sum = sum * std::abs(x) + std::abs(c.c[i]);
       return share * sum;
     }
-    case Characteristic::Kind::Table:
-      return share * c.most;
+    case Characteristic::Kind::Table: {
+      if (c.is_zero) return 0;
+      const size_t i = find_interval(c.x, x);
+      return share * std::max(std::abs(c.f[i]), std::abs(c.f[i + 1]));
+    }
   }
   return 0;
 }

@@ -15,7 +15,6 @@ struct CompiledCharacteristic {
   std::vector<double> x, f;     // Table
   std::vector<double> area;     // Table: integral from x[0] to x[i]
   double area_at_zero = 0;      // Table: integral from x[0] to 0
-  double most = 0;              // Table: largest magnitude
   bool is_zero = true;          // 0 everywhere: nothing to evaluate
   bool has_bound_slope = true;  // false: a polynomial of second degree or more
 };

@@ -168,7 +168,7 @@ void System::note_swing_of_contact() {
   const Energy e = calc_energy();
   if (e.contact == 0 && e.contact_loss == 0 && e.friction == 0) return;
   summary.notes.push_back(fmt::format(
-      "contact swings at up to {:.4g} rad/s, by {:.2g} rad in the set step of {:.3g} s: impacts do not keep "
+      "contact swings at up to {:.4g} rad/s, by {:.2g} rad in the set step of {:.3g} s: impacts may not keep "
       "their energy. A step below {:.2g} s is short enough; where none is set one is chosen",
       frequency, swing, step, kContactAngle / frequency));
 }

@@ -629,6 +629,8 @@ class DeadLoad {
   /// What the most loaded element would bear without limits.
   std::string tell_most_loaded() const;
   enum class End { Found, None, Diverged, Mechanism };
+  /// Tells of the joint that is widest open where an equilibrium was found all the same.
+  void note_open_joint();
   /// Iterates from where the bodies are.
   End search(double good_enough, std::string& message);
   /// Where there is no equilibrium: the loads without limits of elements that crack under them.
@@ -655,6 +657,7 @@ class DeadLoad {
   Vector pushed_back_;                    // what multipliers changed by last (6 per joint)
   Vector pushed_;                         // unbalanced, and gaps pushed back
   double unbalanced_ = 0, gap_left_ = 0;  // over the weight; [m, rad]
+  bool is_balanced_ = false;              // forces were, and joints open
   size_t most_unbalanced_ = 0;            // body
   size_t most_open_ = 0;                  // joint
   std::vector<Overload> overloads_;       // without limits, the largest first
@@ -976,17 +979,28 @@ bool DeadLoad::find(std::string& message) {
                                       [](const ZoneElement& e) { return !e.stations.empty(); }) ||
                           !s_.model.rotational_elements.empty();
   // by that stiffness joints on short levers close slowly
-  const bool is_open = unbalanced_ < good_enough;
-  if (end == End::None && !s_.joints.empty() && (is_open || !has_limits)) {
+  if (end == End::None && !s_.joints.empty() && (is_balanced_ || !has_limits)) {
+    const bool was_balanced = is_balanced_;
+    const int iterations = s_.summary.equilibrium_iterations;
+    const double residual = s_.summary.equilibrium_residual, first = penalty_;
+    std::string other;
     share_ = 1;
     for (const double stiffer : {1e2, 1e4, 1e6}) {
-      penalty_ = stiffer * hold_;
+      penalty_ = stiffer * first;
       begin_again();
-      std::string other;
       if (search(good_enough, other) == End::Found) return true;
     }
-    if (is_open) return false;
-    penalty_ = hold_;
+    // constraints that all but repeat others need not close: the run lets go of them
+    penalty_ = first, hold_ = 0;
+    if (was_balanced) {
+      begin_again();
+      if (search(good_enough, other) == End::Found) {
+        note_open_joint();
+        return true;
+      }
+    }
+    s_.summary.equilibrium_iterations = iterations;
+    s_.summary.equilibrium_residual = residual;
   }
   // what turns far, where nothing has limits: on short turns
   if (!has_limits) {
@@ -1029,7 +1043,16 @@ void DeadLoad::find_cracked_loads(double good_enough) {
   s_.summary.equilibrium_residual = residual;
 }
 
+void DeadLoad::note_open_joint() {
+  s_.summary.notes.push_back(fmt::format(
+      "the equilibrium leaves a gap of {:.2g} m or rad in joint \"{}\", which the first step closes: it is that "
+      "of constraints that all but repeat others, or of a joint on so short a lever that the forces that the "
+      "run begins with are wrong",
+      gap_left_, s_.model.joints[most_open_].name.substr(0, 60)));
+}
+
 DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
+  is_balanced_ = false;
   // first without limits, so that an overloaded element can be named; then with them
   s_.ignores_limits = !measures_loads_;
   constexpr int most = 400;
@@ -1067,6 +1090,7 @@ DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
       continue;
     }
     if (measures_loads_ && unbalanced_ < 1e-6 && gap_left_ < 1e-6) return End::Found;
+    is_balanced_ = is_balanced_ || (!s_.ignores_limits && unbalanced_ < good_enough && calc_left() >= good_enough);
     if (!s_.ignores_limits && unbalanced_ < 1e-11 && gap_left_ < 1e-11) break;
     // round-off ends the improvement of very stiff models earlier
     const double left = calc_left();

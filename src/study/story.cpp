@@ -567,13 +567,13 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
     }
     for (const Confirmation::Run& run : r.confirmation.runs) {
       if (&r.alpha.archive[static_cast<std::size_t>(run.sample)] != core ||
-          run.whole.state == uncertainty::Result::State::NotRun)
+          run.whole.state != uncertainty::Result::State::Done)
         continue;
       const int whole = uncertainty::outcome_of(run.whole);
       if (whole == at_core) continue;
       text += fmt::format(" That is of condensed runs: the whole run with these values has the outcome {}.",
                           quoted(words_of_outcome(r, whole)));
-      status = name_of_outcome(r, whole) == p.asked ? Status::Warning : Status::Bad;
+      status = p.asked.empty() || name_of_outcome(r, whole) == p.asked ? Status::Warning : Status::Bad;
     }
     if (is_open)
       text += " With the core values parts still moved when the run ended: what it was called then may become another.";
@@ -599,7 +599,7 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
         Status::Warning);
   long compared = 0, different = 0;
   for (const Confirmation::Run& run : r.confirmation.runs) {
-    if (run.whole.state == uncertainty::Result::State::NotRun) continue;
+    if (run.whole.state != uncertainty::Result::State::Done) continue;
     ++compared;
     const uncertainty::Sample& condensed = r.alpha.archive[static_cast<std::size_t>(run.sample)];
     if (uncertainty::outcome_of(run.whole) != uncertainty::outcome_of(condensed.result)) ++different;

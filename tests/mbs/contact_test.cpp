@@ -370,7 +370,7 @@ TEST(GroundContact, NotesASetStepThatIsTooLongForIt) {
   ASSERT_EQ(notes.size(), 1u);
   EXPECT_EQ(
       notes[0],
-      "contact swings at up to 1421 rad/s, by 1.4 rad in the set step of 0.001 s: impacts do not keep their energy. "
+      "contact swings at up to 1421 rad/s, by 1.4 rad in the set step of 0.001 s: impacts may not keep their energy. "
       "A step below 0.00013 s is short enough; where none is set one is chosen");
   EXPECT_TRUE(note_lost_contacts(m, 0.5, 2e-4).empty());
   EXPECT_TRUE(note_lost_contacts(m, 0.1, 1e-3).empty()) << "it has not come down yet";

@@ -543,6 +543,33 @@ TEST(JointPhysics, RepeatedConstraintsNeedNotMeetToTheLastDigit) {
   EXPECT_LT(s.equilibrium_iterations, 50);
 }
 
+TEST(JointPhysics, AxesThatAlmostRepeatEachOtherHaveAnEquilibrium) {
+  // a flap on two hinges whose axes differ in the seventh digit, and a prop: what one of them adds is let go of
+  for (const double off : {4e-7, 1e-6}) {
+    Model m = empty_model();
+    m.gravity = {0, 0, -9.81};
+    add_body(m, test::make_box("flap", 1000, {1, 1, 0.1}, {1, 0, 0}));
+    test::join(m, Joint::Kind::Revolute, kGround, {0}, {0, -1, 0}, test::along({0, 1, 0}), "one");
+    test::join(m, Joint::Kind::Revolute, kGround, {0}, {0, 1, 0}, test::along({off, 1, 0}), "other");
+    SpringDamper prop;
+    prop.name = "prop";
+    prop.a = kGround, prop.b = {0};
+    prop.p_A = {2, 0, -2}, prop.p_B = {1, 0, 0};
+    prop.free_length = 2;
+    prop.spring.rate = 1e5;
+    m.springs.push_back(prop);
+    Options o = options_of(1e-3, 1e-3);
+    o.equilibrium = true;
+    double force = 0;
+    o.on_frame = [&](const View& v) {
+      if (v.time == 0) force = calc_quantity({Quantity::Kind::SpringForce, 0}, v)[0];
+    };
+    const Summary s = run(m, o);
+    ASSERT_EQ(s.ending, Summary::Ending::TimeLimit) << off << " " << s.message;
+    EXPECT_NEAR(std::abs(force), 1000 * 9.81 / 2, 100) << off;
+  }
+}
+
 TEST(JointPhysics, EquilibriumHangsOnNoOrderOfBodies) {
   // the arm alone goes astray and is found on shorter ways; no body beside it may hide that
   double angle[2] = {0, 0};

@@ -78,7 +78,8 @@ TEST(Confirmation, MarksEachBoundByWholeRuns) {
 
 TEST(Confirmation, TheVerdictSaysWhatTheWholeRunOfTheCoreWas) {
   const Folder folder;
-  const Problem p = make_problem(20);
+  Problem p = make_problem(20);
+  p.asked = "holds";
   const RunnerFactories others = {{"small", [](const std::string& definition) -> Runner {
                                      const bool is_whole = json::parse(definition).at("identity").contains("whole");
                                      return [is_whole](auto points, const auto& give, const auto& cancel) {
