@@ -21,6 +21,12 @@ bool waits_for_joint(const mbs::Event& e) {
   });
 }
 
+/// What a joint bears is handed on where it is loosened.
+bool loosens(const mbs::Event& e) {
+  return std::any_of(e.actions.begin(), e.actions.end(),
+                     [](const mbs::Action& a) { return a.kind == mbs::Action::Kind::LoosenJoint; });
+}
+
 bool has_limit(const mbs::Joint& j) {
   return j.tension_limit < mbs::kUnlimited || j.shear_limit < mbs::kUnlimited || j.moment_limit < mbs::kUnlimited ||
          j.rotation_limit < mbs::kUnlimited;
@@ -72,7 +78,7 @@ Course::Course(const mbs::Model& model, const mbs::Options& options)
     (model.events[i].triggers.empty() ? timed_ : waiting_).push_back(i);
     const double ramp = model.events[i].triggers.empty() ? find_longest_ramp(model.events[i]) : 0;
     last_event_ = std::max(last_event_, model.events[i].time + ramp);
-    needs_reactions_ |= waits_for_joint(model.events[i]);
+    needs_reactions_ |= waits_for_joint(model.events[i]) || loosens(model.events[i]);
   }
   std::stable_sort(timed_.begin(), timed_.end(),
                    [&](size_t a, size_t b) { return model.events[a].time < model.events[b].time; });
@@ -305,7 +311,13 @@ bool Course::check_joints() {
 }
 
 void Course::loosen(size_t j) {
-  if (!joint_live_[j] || !forces_.loosen_joint(j)) return;
+  if (!joint_live_[j]) return;
+  Vec3 force, moment;
+  if (reactions_.force.size() == model_.joints.size()) {
+    const Mat3 F = to_matrix(frames_of(model_.joints[j]).X_WF.q);
+    force = transpose_times(F, reactions_.force[j]), moment = transpose_times(F, reactions_.moment[j]);
+  }
+  if (!forces_.loosen_joint(j, force, moment, time_)) return;
   joint_live_[j] = 0;
   must_rebuild_ = true;
 }
@@ -347,6 +359,13 @@ bool Course::fire_events() {
     (holds ? due : still).push_back(i);
   }
   waiting_ = still;
+  // in the order of their times, those of one time in that of the model
+  const auto time_of = [&](size_t i) {
+    const mbs::Event& e = model_.events[i];
+    return e.triggers.empty() || e.time > time_ - step_ ? std::min(e.time, time_) : time_;
+  };
+  std::stable_sort(due.begin(), due.end(),
+                   [&](size_t a, size_t b) { return time_of(a) != time_of(b) ? time_of(a) < time_of(b) : a < b; });
   for (const size_t i : due) fire(i);
   return fired;
 }

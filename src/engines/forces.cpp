@@ -556,7 +556,7 @@ bool Forces::has_broken_hinge(size_t j) const {
   return false;
 }
 
-bool Forces::loosen_joint(size_t j) {
+bool Forces::loosen_joint(size_t j, const Vec3& f, const Vec3& m, double time) {
   for (size_t i = 0; i < rotational_.size(); ++i) {
     const mbs::RotationalElement& r = model_.rotational_elements[i];
     Zone& z = rotational_[i];
@@ -567,7 +567,8 @@ bool Forces::loosen_joint(size_t j) {
     for (int c = 0; c < 3; ++c) z.parameters.stiffness[c] = r.loose_translational[c];
     z.parameters.stiffness[3] = r.loose_torsion;
     z.parameters.stiffness[4] = r.loose_bending;
-    mbs::free_zone(z.parameters, z.state);
+    mbs::free_zone(z.parameters, {{-f.x, -f.y, -f.z, -m.x, -m.y, 0}}, z.state);
+    end_torsions(j, time);
     return true;
   }
   return false;
@@ -585,6 +586,10 @@ void Forces::release_joint(size_t j, double time) {
   for (size_t i = 0; i < rotational_.size(); ++i)
     if (model_.rotational_elements[i].joint.index == static_cast<int>(j) && rotational_[i].state.live)
       mbs::break_zone(rotational_[i].state, mbs::BreakReason::Removed);
+  end_torsions(j, time);
+}
+
+void Forces::end_torsions(size_t j, double time) {
   for (size_t i = 0; i < torsion_.size(); ++i) {
     if (model_.rotational_springs[i].joint.index != static_cast<int>(j) || !torsion_[i].live) continue;
     plastic_ += torsion_[i].stored;

@@ -61,8 +61,11 @@ class Forces {
   void switch_law(const mbs::Action&, double time);
   /// Whether the joint's rotational element holds no longer; false if it has none.
   bool has_broken_hinge(size_t joint) const;
-  /// Lets the joint's rotational element take over; false if it has none that holds.
-  bool loosen_joint(size_t joint);
+  /// Lets the joint's rotational element take over with what the joint bears; false if it has none that holds.
+  ///   force, moment  on the child, in F [N, N·m]
+  bool loosen_joint(size_t joint, const Vec3& force, const Vec3& moment, double time);
+  /// Ends its rotational springs.
+  void end_torsions(size_t joint, double time);
   /// Whether it has, and still holds.
   bool is_loose(size_t joint) const { return find_loose(joint) != nullptr; }
   /// Force and moment that this element puts on the parent at the last accepted state, in F; null: there is none

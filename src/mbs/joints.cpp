@@ -615,8 +615,10 @@ void System::loosen_joint(size_t i) {
   const size_t r = static_cast<size_t>(joints[i].rotational);
   ZoneState& z = state.rotational[r];
   if (!state.joint[i].live || !z.live) return;  // one that turns freely stays a joint
+  const Mat3 F = rotation_of(joints[i].parent) * joints[i].R_PF;
+  const Vec3 f = transpose_times(F, state.joint[i].force), m = transpose_times(F, state.joint[i].moment);
   drop_joint(i);
-  free_zone(rotationals[r].zone, z);
+  free_zone(elements[E + r].zone, {{-f.x, -f.y, -f.z, -m.x, -m.y, 0}}, z);
   state.element[E + r] = std::exchange(z, {});
   z.live = false;
   begun_elements.push_back(E + r);

@@ -148,12 +148,27 @@ void crack_zone(const ZoneParameters& p, ZoneState& z) {
 
 }  // namespace
 
-void free_zone(const ZoneParameters& p, ZoneState& z) {
+void free_zone(const ZoneParameters& p, const Six& carried, ZoneState& z) {
   crack_zone(p, z);
   z.axial = z.lifted = 0;  // those of the element that took them
   z.deformation[0] = z.elastic[0] = z.elastic_force[0] = z.damper_force[0] = z.flowed[0] = 0;
   z.normal_force = z.resultant.c[0] = 0;
   for (double& x : z.offset) x = 0;
+  // what the joint bore, from where the bodies are
+  double* const unstrained[] = {&z.axial, &z.slip[0], &z.slip[1], &z.twist, &z.station[0].phi[0]};
+  const ActiveComponents active = components_of(p.plane);
+  for (int c = 0; c < active.count; ++c) {
+    const int i = active.at[c];
+    const double k = z.share * p.stiffness[i], f = carried.c[i];
+    if (i == 5 || !(k > 0)) continue;
+    const double give = 1 / k + (i == 4 ? z.station[0].soft[0] : 0), stored = 0.5 * f * f * give;
+    *unstrained[i] -= f * give;
+    z.elastic[i] = z.flowed[i] = f / k;
+    z.elastic_force[i] = z.resultant.c[i] = f;
+    z.energy += stored;
+    z.plastic -= stored;
+  }
+  z.normal_force = z.resultant.c[0];
   z.safe_force[0] = 1, z.safe_force[1] = -1;
 }
 

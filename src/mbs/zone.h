@@ -168,9 +168,10 @@ void elongate_zone(const ZoneParameters&, double by, ZoneState&);
 /// without a family.
 double calc_hinge_bearing(const ZoneParameters&, const CompiledLaws&, double time, const ZoneState&);
 /// Makes the state of a rotational element that of a six-component one, which then has no external axial force: it
-/// keeps its rotation and moment, has cracked as far as at first yield, and transmits nothing else yet. What cracks
-/// store is booked against the plastic work.
-void free_zone(const ZoneParameters&, ZoneState&);
+/// keeps its rotation and moment and has cracked as far as at first yield. What it stores is booked against the plastic
+/// work.
+///   carried  what it bears from now on where the bodies are, as resultants; the last is its own [N, N·m]
+void free_zone(const ZoneParameters&, const Six& carried, ZoneState&);
 /// Ends a zone: what it stores is booked as dissipated.
 void break_zone(ZoneState&, BreakReason);
 

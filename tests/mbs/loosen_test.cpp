@@ -92,6 +92,44 @@ TEST(LoosenJointPhysics, WhatIsCrushedThroughComesApart) {
   EXPECT_LT(sum.energy_error, 1e-3);
 }
 
+TEST(LoosenJointPhysics, GoesOnBearingWhatTheJointDid) {
+  // a box on a post and one that hangs beside it, both at rest: nothing moves when their joints are loosened
+  for (const double side : {0.0, 0.3}) {
+    Model m;
+    m.contact.ground = m.contact.bodies = false;
+    add_body(m, make_box("box", 1000, {0.5, 0.5, 0.5}, {side, 0, 1}));
+    Joint j;
+    j.kind = Joint::Kind::Revolute;
+    j.child = {0};
+    j.X_PF = {{0, 0, 0.5}, test::upright()};
+    j.X_CM = {{-side, 0, -0.5}, test::upright()};
+    RotationalElement r;
+    r.joint = add_joint(m, j);
+    r.stiffness = 1e9;
+    r.damping_ratio = 0;
+    r.loose_translational = {1e7, 1e7, 1e7};
+    r.loose_torsion = r.loose_bending = 1e7;
+    m.rotational_elements.push_back(r);
+    m.events.push_back(make_event(0.05, Action::Kind::LoosenJoint, 0, "loosen"));
+    Options o = options_of(0.3, 1e-4);
+    o.equilibrium = true;
+    double before = 0, least = 1e9, most = 0, moved = 0;
+    Vec3 begun;
+    o.on_frame = [&](const View& v) {
+      const double force = norm(v.joint_force[0]);
+      if (v.time == 0) before = force, begun = v.X_WB[0].p;
+      least = std::min(least, force), most = std::max(most, force);
+      moved = std::max(moved, norm(v.X_WB[0].p - begun));
+    };
+    const Summary s = run(m, o);
+    EXPECT_NEAR(before, 1000 * 9.81, 1e-3);
+    EXPECT_NEAR(least, before, 1e-6 * before) << side;
+    EXPECT_NEAR(most, before, 1e-6 * before) << side;
+    EXPECT_LT(moved, 1e-9) << side;
+    EXPECT_LT(s.energy_error, 1e-6);
+  }
+}
+
 TEST(LoosenJoint, KeepsTheRotationAndWhatItStores) {
   // a rod that swings on an elastic hinge: stiff enough, the element goes on as the joint did
   Model m;
