@@ -163,6 +163,7 @@ void free_zone(const ZoneParameters& p, const Six& carried, ZoneState& z) {
     if (i == 5 || !(k > 0)) continue;
     const double give = 1 / k + (i == 4 ? z.station[0].soft[0] : 0), stored = 0.5 * f * f * give;
     *unstrained[i] -= f * give;
+    z.offset[i] = -f * give;
     z.elastic[i] = z.flowed[i] = f / k;
     z.elastic_force[i] = z.resultant.c[i] = f;
     z.energy += stored;

@@ -125,7 +125,7 @@ TEST(LoosenJointPhysics, GoesOnBearingWhatTheJointDid) {
     EXPECT_NEAR(before, 1000 * 9.81, 1e-3);
     EXPECT_NEAR(least, before, 1e-6 * before) << side;
     EXPECT_NEAR(most, before, 1e-6 * before) << side;
-    EXPECT_LT(moved, 1e-9) << side;
+    EXPECT_LT(moved, 1e-8) << side;  // loaded anew, its springs would sag by 1e-3
     EXPECT_LT(s.energy_error, 1e-6);
   }
 }
