@@ -64,8 +64,6 @@ class Forces {
   /// Lets the joint's rotational element take over with what the joint bears; false if it has none that holds.
   ///   force, moment  on the child, in F [N, N·m]
   bool loosen_joint(size_t joint, const Vec3& force, const Vec3& moment, double time);
-  /// Ends its rotational springs.
-  void end_torsions(size_t joint, double time);
   /// Whether it has, and still holds.
   bool is_loose(size_t joint) const { return find_loose(joint) != nullptr; }
   /// Force and moment that this element puts on the parent at the last accepted state, in F; null: there is none
@@ -101,6 +99,8 @@ class Forces {
   bool depends_on_velocity() const { return depends_on_velocity_; }
 
  private:
+  /// Ends a joint's rotational springs.
+  void end_torsions(size_t joint, double time);
   struct Zone {
     mbs::ZoneParameters parameters;
     mbs::ZoneState state;

@@ -83,6 +83,13 @@ int count_runs(const StudyResult& r, int outcome) {
   return 0;
 }
 
+/// Whether a whole run ended otherwise than the condensed one with the same values.
+bool has_other_outcome(const StudyResult& r, const Confirmation::Run& whole) {
+  const uncertainty::Sample& condensed = r.alpha.archive[static_cast<std::size_t>(whole.sample)];
+  return whole.whole.state == uncertainty::Result::State::Done &&
+         uncertainty::outcome_of(whole.whole) != uncertainty::outcome_of(condensed.result);
+}
+
 /// What was found, but by no run that is possible to more than 0.
 ///   is_searched  nothing more possible was found by a search for it
 std::string tell_impossible(const std::string& what, long runs, std::size_t of_runs, bool is_searched) {
@@ -566,11 +573,8 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
           runs, words_of_most(100 * (1 - std::pow(0.05, 1.0 / spread)), 0) + " %");
     }
     for (const Confirmation::Run& run : r.confirmation.runs) {
-      if (&r.alpha.archive[static_cast<std::size_t>(run.sample)] != core ||
-          run.whole.state != uncertainty::Result::State::Done)
-        continue;
+      if (&r.alpha.archive[static_cast<std::size_t>(run.sample)] != core || !has_other_outcome(r, run)) continue;
       const int whole = uncertainty::outcome_of(run.whole);
-      if (whole == at_core) continue;
       text += fmt::format(" That is of condensed runs: the whole run with these values has the outcome {}.",
                           quoted(words_of_outcome(r, whole)));
       status = p.asked.empty() || name_of_outcome(r, whole) == p.asked ? Status::Warning : Status::Bad;
@@ -599,10 +603,8 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
         Status::Warning);
   long compared = 0, different = 0;
   for (const Confirmation::Run& run : r.confirmation.runs) {
-    if (run.whole.state != uncertainty::Result::State::Done) continue;
-    ++compared;
-    const uncertainty::Sample& condensed = r.alpha.archive[static_cast<std::size_t>(run.sample)];
-    if (uncertainty::outcome_of(run.whole) != uncertainty::outcome_of(condensed.result)) ++different;
+    if (run.whole.state == uncertainty::Result::State::Done) ++compared;
+    if (has_other_outcome(r, run)) ++different;
   }
   if (different > 0)
     add("confirmation",

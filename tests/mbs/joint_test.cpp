@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <limits>
 #include <optional>
 
 #include "mbs/quantity.h"
@@ -466,6 +467,30 @@ TEST(Joints, OfAChainOfAHundredLinksHangTogether) {
   EXPECT_LT(residual, 1e-3 * kinetic);
 }
 
+/// First component of a quantity in the dead-load equilibrium, NaN where there is none.
+double measure_at_rest(const Model& m, const Quantity& quantity) {
+  Options o = options_of(1e-3, 1e-3);
+  o.equilibrium = true;
+  double found = std::numeric_limits<double>::quiet_NaN();
+  o.on_frame = [&](const View& v) {
+    if (v.time == 0) found = calc_quantity(quantity, v)[0];
+  };
+  const Summary s = run(m, o);
+  EXPECT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+  return found;
+}
+
+/// A spring of 2 m under the point (2, 0, 0) of body 0, whose centre is 1 m beside it.
+void add_prop(Model& m, double stiffness) {
+  SpringDamper prop;
+  prop.name = "prop";
+  prop.a = kGround, prop.b = {0};
+  prop.p_A = {2, 0, -2}, prop.p_B = {1, 0, 0};
+  prop.free_length = 2;
+  prop.spring.rate = stiffness;
+  m.springs.push_back(prop);
+}
+
 TEST(JointPhysics, AnArmOnASoftSpringFindsItsEquilibrium) {
   // gravity turns it back by more than twice what the spring does: c a = m g L cos a
   for (const double stiffness : {8.0, 12.0, 30.0}) {
@@ -478,14 +503,7 @@ TEST(JointPhysics, AnArmOnASoftSpringFindsItsEquilibrium) {
     spring.joint = {0};
     spring.spring.rate = stiffness;
     m.rotational_springs.push_back(spring);
-    Options o = options_of(1e-3, 1e-3);
-    o.equilibrium = true;
-    double angle = 0;
-    o.on_frame = [&](const View& v) {
-      if (v.time == 0) angle = calc_quantity({Quantity::Kind::JointAngle, 0}, v)[0];
-    };
-    const Summary s = run(m, o);
-    ASSERT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+    const double angle = measure_at_rest(m, {Quantity::Kind::JointAngle, 0});
     EXPECT_NEAR(stiffness * angle, 2 * 9.81 * std::cos(angle), 1e-6) << stiffness;
   }
 }
@@ -511,20 +529,8 @@ TEST(JointPhysics, AnEquilibriumHasItsJointsClosed) {
     hanger.X_AF.p = {1, 0, -1};
     for (int k = 0; k < 6; ++k) hanger.spring[k].rate = k < 3 ? stiffness : 1e3;
     m.bushings.push_back(hanger);
-    SpringDamper prop;
-    prop.a = kGround, prop.b = {0};
-    prop.p_A = {2, 0, -2}, prop.p_B = {1, 0, 0};
-    prop.free_length = 2;
-    prop.spring.rate = stiffness;
-    m.springs.push_back(prop);
-    Options o = options_of(1e-3, 1e-3);
-    o.equilibrium = true;
-    double pull = 0;
-    o.on_frame = [&](const View& v) {
-      if (v.time == 0) pull = std::abs(calc_quantity({Quantity::Kind::JointForce, 1}, v)[0]);
-    };
-    const Summary s = run(m, o);
-    ASSERT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+    add_prop(m, stiffness);
+    const double pull = std::abs(measure_at_rest(m, {Quantity::Kind::JointForce, 1}));
     EXPECT_NEAR(pull, (100 * 1 + 50 * 2) * 9.81 / 0.1, 1) << stiffness;
   }
 }
@@ -551,21 +557,8 @@ TEST(JointPhysics, AxesThatAlmostRepeatEachOtherHaveAnEquilibrium) {
     add_body(m, test::make_box("flap", 1000, {1, 1, 0.1}, {1, 0, 0}));
     test::join(m, Joint::Kind::Revolute, kGround, {0}, {0, -1, 0}, test::along({0, 1, 0}), "one");
     test::join(m, Joint::Kind::Revolute, kGround, {0}, {0, 1, 0}, test::along({off, 1, 0}), "other");
-    SpringDamper prop;
-    prop.name = "prop";
-    prop.a = kGround, prop.b = {0};
-    prop.p_A = {2, 0, -2}, prop.p_B = {1, 0, 0};
-    prop.free_length = 2;
-    prop.spring.rate = 1e5;
-    m.springs.push_back(prop);
-    Options o = options_of(1e-3, 1e-3);
-    o.equilibrium = true;
-    double force = 0;
-    o.on_frame = [&](const View& v) {
-      if (v.time == 0) force = calc_quantity({Quantity::Kind::SpringForce, 0}, v)[0];
-    };
-    const Summary s = run(m, o);
-    ASSERT_EQ(s.ending, Summary::Ending::TimeLimit) << off << " " << s.message;
+    add_prop(m, 1e5);
+    const double force = measure_at_rest(m, {Quantity::Kind::SpringForce, 0});
     EXPECT_NEAR(std::abs(force), 1000 * 9.81 / 2, 100) << off;
   }
 }
@@ -590,13 +583,7 @@ TEST(JointPhysics, EquilibriumHangsOnNoOrderOfBodies) {
     pad.X_AF.p = {0, 5, 0};
     for (int k = 0; k < 6; ++k) pad.spring[k].rate = 2e4;
     m.bushings.push_back(pad);
-    Options o = options_of(1e-3, 1e-3);
-    o.equilibrium = true;
-    o.on_frame = [&](const View& v) {
-      if (v.time == 0) angle[is_first ? 1 : 0] = calc_quantity({Quantity::Kind::JointAngle, 0}, v)[0];
-    };
-    const Summary s = run(m, o);
-    ASSERT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+    angle[is_first ? 1 : 0] = measure_at_rest(m, {Quantity::Kind::JointAngle, 0});
   }
   EXPECT_NEAR(20 * angle[0], 5 * 9.81 * 0.5 * std::cos(angle[0]), 1e-6);
   EXPECT_NEAR(angle[1], angle[0], 1e-9);
