@@ -32,6 +32,7 @@ void System::impel(int body, const Vec3& impulse, const Vec3& turn) {
   if (dot(impulse, impulse) + dot(turn, turn) > 0) state.has_rest = true;
   const size_t b = static_cast<size_t>(body);
   const bool is_planar = model.is_planar;
+  impelled.push_back({b, impulse, turn});
   state.v[b] += state.body[b].inverse_mass * (is_planar ? Vec3{impulse.x, 0, impulse.z} : impulse);
   state.L[b] += is_planar ? Vec3{0, turn.y, 0} : turn;
   state.w[b] = calc_world_inverse_inertia(b) * state.L[b];

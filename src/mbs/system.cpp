@@ -218,6 +218,13 @@ void System::compile() {
   std::stable_sort(event_order.begin(), event_order.end(),
                    [&](size_t a, size_t b) { return model.events[a].time < model.events[b].time; });
 
+  for (const Event& event : model.events)
+    for (const Action& a : event.actions)
+      if (a.kind == Action::Kind::ReplaceBody) replaceable.push_back(static_cast<size_t>(a.body.index));
+  std::sort(replaceable.begin(), replaceable.end());
+  replaceable.erase(std::unique(replaceable.begin(), replaceable.end()), replaceable.end());
+  s.pressed.resize(replaceable.size());
+
   incidence.assign(B, {});
   for (size_t e = 0; e < elements.size(); ++e) {
     if (elements[e].a >= 0) incidence[static_cast<size_t>(elements[e].a)].push_back(static_cast<int>(2 * e));
@@ -447,6 +454,7 @@ void System::fire_events() {
   }
   if (!state.waiting.empty()) find_triggered(due);
   state.has_rest = false;
+  impelled.clear();
   for (const DueEvent& one : due) {
     act(one);
     state.review_times.push_back(state.time);
@@ -497,7 +505,7 @@ void System::act(const DueEvent& due) {
         loosen_joint(static_cast<size_t>(a.joint.index));
         break;
       case Action::Kind::ReplaceBody:
-        replace_body(static_cast<size_t>(a.body.index), a.replacement);
+        replace_body(static_cast<size_t>(a.body.index), a.replacement, find_ending(time));
         break;
       case Action::Kind::ReleaseCable: {
         const size_t i = static_cast<size_t>(a.cable);
@@ -525,23 +533,38 @@ void System::act(const DueEvent& due) {
   }
 }
 
-void System::replace_body(size_t b, const Body& replacement) {
+void System::replace_body(size_t b, const Body& replacement, const Ending& ending) {
   State& s = state;
   if (fixed[b]) return;
-  const auto energy = [&] {
-    const Mat3 I = world_tensor(s.R[b], s.body[b].inertia);
-    return 0.5 * s.body[b].mass * dot(s.v[b], s.v[b]) + 0.5 * dot(s.w[b], I * s.w[b]) -
-           s.body[b].mass * dot(model.gravity, s.p[b]);
+  // until it was replaced it had the forces of the step before but those that ended with it; contact begins anew
+  const Pressed& pressed =
+      s.pressed[static_cast<size_t>(std::lower_bound(replaceable.begin(), replaceable.end(), b) - replaceable.begin())];
+  Vec3 rest = ending.rest * (force[b] + joint_force[b] - pressed.force);
+  Vec3 turn = ending.rest * (torque[b] + joint_torque[b] - pressed.torque);
+  if (model.is_planar) rest.y = turn.x = turn.z = 0;
+  for (const Impelled& one : impelled)
+    if (one.body == b) rest -= one.impulse, turn -= one.turn;
+  const Vec3 weighed = ending.rest * model.gravity;
+  const double since = ending.ago * s.last_kick;
+  const Mat3 R = since > 0 ? to_matrix(exp_rotation(-since * s.w[b])) * Mat3(s.R[b]) : Mat3(s.R[b]);
+  const auto energy = [&](const Vec3& v, const Vec3& w) {
+    return 0.5 * s.body[b].mass * (dot(v, v) - 2 * dot(model.gravity, s.p[b] - since * v)) +
+           0.5 * dot(w, world_tensor(R, s.body[b].inertia) * w);
   };
-  const double before = energy() + take_pressed(b, step);
-  const Vec3 moved = replacement.X_WB.p;  // from the old centre to the new one, in B
-  s.v[b] += cross(s.w[b], s.R[b] * moved);
-  s.p[b] += s.R[b] * moved;
-  s.p_offset[b] += moved;
+  const Vec3 v = s.v[b] + s.body[b].inverse_mass * rest + weighed;
+  const Vec3 w = world_tensor(R, s.body[b].inverse_inertia) * (s.L[b] + turn);
+  const double before = energy(v, w) + take_pressed(b, step);
   clusters_due = true;  // levers and masses have changed
   forget_crushed_boxes_of(b);
   s.body[b] = constants_of(replacement, model.is_planar, normalized(model.bodies[b].X_WB.q));
-  s.L[b] = world_tensor(s.R[b], s.body[b].inertia) * s.w[b];
+  // from the old centre to the new one
+  const Vec3 moved = R * replacement.X_WB.p, v_new = v + cross(w, moved);
+  s.p[b] += s.R[b] * replacement.X_WB.p;
+  s.p_offset[b] += replacement.X_WB.p;
+  s.v[b] = v_new - s.body[b].inverse_mass * rest - weighed;
+  s.L[b] = world_tensor(R, s.body[b].inertia) * w - (turn - cross(moved, rest));
+  s.w[b] = calc_world_inverse_inertia(b) * s.L[b];
+  const double after = energy(v_new, w);
   pack_body(b);
   for (const int entry : incidence[b]) {
     unpack_element(static_cast<size_t>(entry / 2));
@@ -552,7 +575,7 @@ void System::replace_body(size_t b, const Body& replacement) {
   layout_shapes();
   find_crushed_boxes_of(b, replacement);
   number_crushed_boxes();
-  s.removed += before - energy();
+  s.removed += before - after;
   s.search_due = true;
   drop_pairs_of(b);
   s.touching.steps = 0;  // its points are others now
@@ -588,11 +611,15 @@ void System::push_bodies(double h) {
   evaluate_cables(false);
   evaluate_springs(false);
   evaluate_loads(false);
+  for (size_t i = 0; i < replaceable.size(); ++i)
+    state.pressed[i] = {-Vec3(force[replaceable[i]]), -Vec3(torque[replaceable[i]])};
 }
 
 void System::finish_forces(double h) {
   if (!state.crushed_boxes.empty()) shorten_boxes();
   if (model.contact.ground || model.contact.bodies) evaluate_contact(h);
+  for (size_t i = 0; i < replaceable.size(); ++i)
+    state.pressed[i].force += force[replaceable[i]], state.pressed[i].torque += torque[replaceable[i]];
   evaluate_dampers();
   if (model.is_planar) drop_forces_across();
 }

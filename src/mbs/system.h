@@ -81,6 +81,11 @@ struct CableState {
   double rest_length = 0, force = 0, energy = 0, plastic = 0;
 };
 
+/// What contact alone gave a body at the last step, about its centre, in W [N, N·m].
+struct Pressed {
+  Vec3 force, torque;
+};
+
 /// Everything that changes in time. Plain data: a copy is a snapshot.
 struct State {
   long step_index = 0;
@@ -111,6 +116,7 @@ struct State {
   LaneArray<GroundBox> ground_box;  // (B)
   std::vector<unsigned char> touched_ground;
   std::vector<unsigned char> ground_clear;  // no point touches the ground or remembers that it did (B)
+  std::vector<Pressed> pressed;             // of System::replaceable, in its order
   // connections
   std::vector<ZoneState> element;     // (E + R)
   std::vector<ZoneState> rotational;  // not live and without a reason once its joint is loosened (R)
@@ -290,6 +296,7 @@ class System {
   std::string trouble;                 // why the run cannot go on; empty: nothing
   std::vector<DueEvent> due_events;    // of this step
   std::vector<size_t> begun_elements;  // in it
+  std::vector<size_t> replaceable;     // bodies that events replace, sorted
   ContactScratch contact;
   View view;
 
@@ -390,6 +397,12 @@ class System {
   /// When a quantity passed a limit, from its value at the step before and now; now if it was beyond it then.
   Ending find_ending(double before, double now, double limit) const;
   void impel(int body, const Vec3& impulse, const Vec3& turn);
+  /// What bodies have had at once since the last events began [N s, N m s].
+  struct Impelled {
+    size_t body;
+    Vec3 impulse, turn;
+  };
+  std::vector<Impelled> impelled;
   /// Ends the pull of a row at the deformation x; returns what its spring stored then [J].
   double end_row(int a, int b, const ForceRow&, const CompiledCharacteristic& spring,
                  const CompiledCharacteristic& damper, ComponentState&, double x, const Ending&, double& damping);
@@ -626,7 +639,7 @@ class System {
   void tell_yields();
   void release_joint(size_t j, const char* reason);
   void release_joint(size_t j, double time);  // by an event
-  void replace_body(size_t b, const Body& replacement);
+  void replace_body(size_t b, const Body& replacement, const Ending&);
   /// Polyhedra of the model and of what events put in place of bodies.
   void compile_hulls();
   int find_hull(const Shape&) const;

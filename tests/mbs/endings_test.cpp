@@ -226,6 +226,51 @@ TEST(Ending, OfAJointIsOfSecondOrder) {
   EXPECT_GT(error[0] / error[2], 12);
 }
 
+TEST(ReplacedBody, GoesOnWithSecondOrder) {
+  // a tenth of the mass is left: the speed stays, the frequency does not
+  const double late = 0.0707, left = 0.1, fast = std::sqrt(kRate / left);
+  const double x = kSpeed / kOmega * std::sin(kOmega * late), v = kSpeed * std::cos(kOmega * late);
+  const double place = 1 + x * std::cos(fast * (1 - late)) + v / fast * std::sin(fast * (1 - late));
+  for (const double step : {2e-3, 1e-3, 5e-4}) {
+    Model m = with(make_sprung(), make_event(late, Action::Kind::ReplaceBody));
+    m.events[0].actions[0].body = {0};
+    m.events[0].actions[0].replacement = make_box("left", left, {0.1, 0.1, 0.1}, {});
+    const Result r = run_to_one(m, step);
+    // a rest of half a step with the new mass made 3e-3 at 2 ms
+    EXPECT_NEAR(r.place.x, place, 4e-5 * std::pow(step / 1e-3, 2)) << step;
+    EXPECT_LT(r.energy_error, 2e-4 * std::pow(step / 1e-3, 2)) << step;
+  }
+}
+
+TEST(ReplacedBody, DoesNotDependOnWhatEndsBeforeOrAfterIt) {
+  // a pendulum under the pull of a spring, whose piece that is left has its centre elsewhere as the hinge comes off
+  const auto make = [](bool is_first) {
+    Model m = make_pendulum();
+    SpringDamper s;
+    s.name = "spring";
+    s.a = kGround, s.b = {0};
+    s.p_A = {0.5, 2, 3}, s.p_B = {0.5, 0.3, 0.2};
+    s.free_length = 2;
+    s.spring.rate = 900;
+    m.springs.push_back(s);
+    m = with(m, make_event(0.304, Action::Kind::ReleaseJoint));
+    Action a;
+    a.kind = Action::Kind::ReplaceBody;
+    a.body = {0};
+    a.replacement = make_box("left", 0.5, {0.1, 0.1, 0.1}, {0.3, 0.1, -0.05});
+    a.replacement.inertia = Mat3::diagonal({0.1, 0.05, 0.12});
+    std::vector<Action>& actions = m.events[0].actions;
+    actions.insert(is_first ? actions.begin() : actions.end(), a);
+    return m;
+  };
+  Vec3 place[4];
+  for (int i = 0; i < 4; ++i) {
+    place[i] = run_to_one(make(false), 1e-3 / (1 << i)).place;
+    EXPECT_LT(norm(run_to_one(make(true), 1e-3 / (1 << i)).place - place[i]), 1e-9) << i;
+  }
+  EXPECT_GT(norm(place[0] - place[1]) / norm(place[2] - place[3]), 11);
+}
+
 TEST(Ending, OfASpringWhoseJointComesOffAtItsLimitTurnsNothing) {
   Model m = make_pendulum();
   RotationalSpring r;
