@@ -223,7 +223,7 @@ void System::compile() {
       if (a.kind == Action::Kind::ReplaceBody) replaceable.push_back(static_cast<size_t>(a.body.index));
   std::sort(replaceable.begin(), replaceable.end());
   replaceable.erase(std::unique(replaceable.begin(), replaceable.end()), replaceable.end());
-  s.pressed.resize(replaceable.size());
+  s.pressed.resize(B);
 
   incidence.assign(B, {});
   for (size_t e = 0; e < elements.size(); ++e) {
@@ -537,10 +537,8 @@ void System::replace_body(size_t b, const Body& replacement, const Ending& endin
   State& s = state;
   if (fixed[b]) return;
   // until it was replaced it had the forces of the step before but those that ended with it; contact begins anew
-  const Pressed& pressed =
-      s.pressed[static_cast<size_t>(std::lower_bound(replaceable.begin(), replaceable.end(), b) - replaceable.begin())];
-  Vec3 rest = ending.rest * (force[b] + joint_force[b] - pressed.force);
-  Vec3 turn = ending.rest * (torque[b] + joint_torque[b] - pressed.torque);
+  Vec3 rest = ending.rest * (force[b] + joint_force[b] - s.pressed[b].force);
+  Vec3 turn = ending.rest * (torque[b] + joint_torque[b] - s.pressed[b].torque);
   if (model.is_planar) rest.y = turn.x = turn.z = 0;
   for (const Impelled& one : impelled)
     if (one.body == b) rest -= one.impulse, turn -= one.turn;
@@ -611,15 +609,13 @@ void System::push_bodies(double h) {
   evaluate_cables(false);
   evaluate_springs(false);
   evaluate_loads(false);
-  for (size_t i = 0; i < replaceable.size(); ++i)
-    state.pressed[i] = {-Vec3(force[replaceable[i]]), -Vec3(torque[replaceable[i]])};
+  for (const size_t b : replaceable) state.pressed[b] = {-Vec3(force[b]), -Vec3(torque[b])};
 }
 
 void System::finish_forces(double h) {
   if (!state.crushed_boxes.empty()) shorten_boxes();
   if (model.contact.ground || model.contact.bodies) evaluate_contact(h);
-  for (size_t i = 0; i < replaceable.size(); ++i)
-    state.pressed[i].force += force[replaceable[i]], state.pressed[i].torque += torque[replaceable[i]];
+  for (const size_t b : replaceable) state.pressed[b].force += force[b], state.pressed[b].torque += torque[b];
   evaluate_dampers();
   if (model.is_planar) drop_forces_across();
 }

@@ -116,7 +116,7 @@ struct State {
   LaneArray<GroundBox> ground_box;  // (B)
   std::vector<unsigned char> touched_ground;
   std::vector<unsigned char> ground_clear;  // no point touches the ground or remembers that it did (B)
-  std::vector<Pressed> pressed;             // of System::replaceable, in its order
+  std::vector<Pressed> pressed;             // of System::replaceable, else nothing (B)
   // connections
   std::vector<ZoneState> element;     // (E + R)
   std::vector<ZoneState> rotational;  // not live and without a reason once its joint is loosened (R)

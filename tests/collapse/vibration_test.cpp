@@ -283,7 +283,8 @@ TEST(VibrationRunPhysics, WhatIsLostIsWhatTheBalanceSays) {
   const std::vector<double> lost = calc_lost_energy(r);
   const double fall = -change("energy_gravity") - change("energy_kinetic") - change("energy_removed");
   EXPECT_GT(fall, 0);
-  EXPECT_NEAR(lost.back() - lost.front(), fall, 0.01 * fall);
+  // what the balance lacks is neither
+  EXPECT_NEAR(lost.back() - lost.front(), fall + change("energy_residual"), 1e-9 * fall);
 }
 
 TEST(VibrationRunPhysics, ABandBelowItsLimitIsNotJudgedWhilePartsMayComeDown) {
