@@ -316,6 +316,7 @@ Standing add_stability(const Context& c) {
     return is_standing;
   };
   if (block.empty()) return out;
+  const bool rests = c.summary.ending == mbs::Summary::Ending::AtRest;  // from its end on nothing happens
   describe("stability.start", "Before the first charge", 0, false, 0);
   std::vector<size_t> fired;
   for (size_t s = 0; s + 1 < stages.size(); ++s) {
@@ -335,8 +336,9 @@ Standing add_stability(const Context& c) {
     const BlockFrame& last = block[i];
     if (stands(last, c.k)) {
       // no part falls faster than freely
-      const double gap = end - last.time, way = last.fastest * gap + 0.5 * norm(c.model.gravity) * gap * gap;
-      if (end > c.r.time.back() + 1e-9) {
+      const double gap = rests && end > c.r.time.back() ? 0 : end - last.time;
+      const double way = last.fastest * gap + 0.5 * norm(c.model.gravity) * gap * gap;
+      if (!rests && end > c.r.time.back() + 1e-9) {
         leave_open(fmt::format("the run ends at {:.2f} s, before \"{}\"", c.r.time.back(), next));
         break;
       }
@@ -351,7 +353,7 @@ Standing add_stability(const Context& c) {
       }
     }
     out.fell |= !describe(id, title, i, true, begin);
-    if (end > c.r.time.back() + 1e-9) break;
+    if (!rests && end > c.r.time.back() + 1e-9) break;
   }
   return out;
 }

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <tuple>
 
+#include "base/disjoint_sets.h"
 #include "base/error.h"
 #include "base/unit.h"
 #include "collapse/builder.h"
@@ -67,6 +69,32 @@ int Builder::add_assembly(Assembly a) {
   return static_cast<int>(assemblies.size()) - 1;
 }
 
+/// Ground columns of what a charge acts on, by the grid's lines that members join; of all where none acts on a frame.
+static std::vector<int> find_charged_columns(const product::Plan& plan) {
+  const int frames = static_cast<int>(plan.frame_offsets.size());
+  DisjointSets linked(plan.row_offsets.size() * plan.frame_offsets.size());
+  const auto place = [frames](int row, int frame) { return row * frames + frame; };
+  for (const Member& m : plan.members) {
+    if (m.removed || m.kind == MemberKind::Shaft) continue;
+    for (const int row : {m.row_a, m.row_b})
+      for (const int frame : {m.frame_a, m.frame_b})
+        linked.join_under_lower(place(m.row_a, m.frame_a), place(row, frame));
+  }
+  std::set<int> charged;
+  for (const product::Stage& s : plan.stages)
+    for (const product::Charge& c : s.charges)
+      if (const Member& m = plan.members[static_cast<size_t>(c.member)]; !c.fails && m.kind != MemberKind::Shaft)
+        charged.insert(linked.find(place(m.row_a, m.frame_a)));
+  std::vector<int> columns;
+  for (size_t i = 0; i < plan.members.size(); ++i) {
+    const Member& m = plan.members[i];
+    if (m.kind != MemberKind::Column || m.storey != 0 || m.removed) continue;
+    if (charged.empty() || charged.contains(linked.find(place(m.row_a, m.frame_a))))
+      columns.push_back(static_cast<int>(i));
+  }
+  return columns;
+}
+
 void Builder::find_direction() {
   double azimuth = 3.14159265358979323846;
   if (plan.criteria.azimuth) {
@@ -86,12 +114,11 @@ void Builder::find_direction() {
     // away from the ground columns that keep standing, along the grid
     Vec3 all, standing;
     int n_all = 0, n_standing = 0;
-    for (size_t i = 0; i < plan.members.size(); ++i) {
-      const Member& m = plan.members[i];
-      if (m.kind != MemberKind::Column || m.storey != 0 || m.removed) continue;
+    for (const int i : find_charged_columns(plan)) {
+      const Member& m = member(i);
       bool fired = false;
       for (const product::Stage& s : plan.stages)
-        for (const product::Charge& c : s.charges) fired |= c.member == static_cast<int>(i) && !c.fails;
+        for (const product::Charge& c : s.charges) fired |= c.member == i && !c.fails;
       all += m.start, ++n_all;
       if (!fired) standing += m.start, ++n_standing;
     }

@@ -202,10 +202,12 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) {
   is_of_block_.assign(B, 0);
   const auto is_apart = [this](size_t b) { return std::isfinite(apart_since_[b]); };
   double beside = 0, beside_moved = 0;
-  const double far =
-      k_.mechanism_moved_displacement * (map_.ground_storey_height > 0 ? map_.ground_storey_height : 1.0);
+  const double share = k_.mechanism_moved_displacement;
   for (size_t b = 0; b < B; ++b) {
     if (model_.bodies[b].fixed) continue;
+    // a shaft has no storeys
+    const bool has_storeys = map_.bodies[b].kind != "shaft" && map_.ground_storey_height > 0;
+    const double far = share * (has_storeys ? map_.ground_storey_height : 1.0);
     const double m = v.mass[b];
     const double fall = start_[b].p.z - v.X_WB[b].p.z;
     const bool has_moved = norm(v.X_WB[b].p - start_[b].p) > far;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <set>
 
 #include "base/disjoint_sets.h"
 #include "collapse/builder.h"
@@ -40,13 +41,16 @@ void Builder::find_structures() {
   for (const mbs::ZoneElement& e : model.elements) link(e.a, e.b);
   for (const mbs::Joint& j : model.joints) link(j.parent, j.child);
 
-  // the lowest charge that fires on each member
+  // the lowest charge that fires on each member; one that fails tells what is to come down all the same
   std::map<int, double> fired;
+  std::set<int> charged;
   for (const product::Stage& s : plan.stages)
-    for (const product::Charge& c : s.charges)
-      if (!c.fails)
-        if (const auto [it, is_new] = fired.emplace(c.member, c.position); !is_new)
-          it->second = std::min(it->second, c.position);
+    for (const product::Charge& c : s.charges) {
+      charged.insert(c.member);
+      if (c.fails) continue;
+      if (const auto [it, is_new] = fired.emplace(c.member, c.position); !is_new)
+        it->second = std::min(it->second, c.position);
+    }
   for (const auto& [index, position] : fired)
     if (const auto shaft = shafts.find(index); shaft != shafts.end())
       for (const ShaftJoint& j : shaft->second.joints)
@@ -60,7 +64,7 @@ void Builder::find_structures() {
     g.has_upper |= map.bodies[b].is_upper;
     g.is_shaft |= map.bodies[b].kind == "shaft";
     for (const Part& p : assemblies[b].parts) {
-      g.is_charged |= fired.count(p.member) > 0;
+      g.is_charged |= charged.contains(p.member);
       if (g.name.empty() && p.member >= 0) g.name = member(p.member).name;
     }
   }

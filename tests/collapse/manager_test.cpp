@@ -525,6 +525,22 @@ TEST(ManagerPhysics, AStubIsCrushedByWhatComesDownOnIt) {
   EXPECT_NEAR(drop[0], drop[1], 0.04 * drop[1]);
 }
 
+TEST(Manager, WhatStandsApartTurnsNoHinge) {
+  const auto is_about_y = [](const std::string& frames, const std::string& more) {
+    return build(read(materials() +
+                      grid("A = \"0 m\", B = \"5 m\", C = \"10 m\"", "1 = \"0 m\", 2 = \"4 m\"" + frames, 1) +
+                      "[[columns]]\nsection = \"column\"\nat = [\"?1\", \"?2\"]\n" + more +
+                      "[[beams]]\nsection = \"beam\"\nat = [\"?1?1\", \"?2?2\", \"?1?2\"]\n" + charge("C-A*-0") +
+                      analysis()))
+        .map.hinge_about_y;
+  };
+  EXPECT_TRUE(is_about_y("", ""));
+  const std::string far = ", 3 = \"204 m\"", column = "[[columns]]\nsection = \"column\"\nat = [\"B3\"]\n";
+  EXPECT_TRUE(is_about_y(far, column)) << "a column 200 m away";
+  // one that a beam ties to them counts
+  EXPECT_FALSE(is_about_y(far, column + "[[beams]]\nsection = \"beam\"\nat = [\"B2B3\"]\n"));
+}
+
 TEST(Manager, AFailingChargeDoesNothing) {
   const product::Plan plan = read(portal(charge("C-A1-0", "0 s", "fails = true") + charge("C-B1-0", "0.5 s")));
   const Built b = build(plan);

@@ -479,6 +479,40 @@ TEST(Structures, ThoseThatChargesActOnAreJudgedOneByOneTheHeaviestFirst) {
   EXPECT_NE(b.map.notes.back().text.find("Charges act on 2 separate structures (with tower, low)"), std::string::npos);
 }
 
+TEST(ShaftRun, WhatIsJudgedDoesNotHangOnStoreysElsewhere) {
+  // a low shaft falls beside a frame that no charge acts on: half of the 9 m of its storey are no measure for it
+  const auto judge = [](const std::string& beside) {
+    const record::Record r =
+        run_plan(read(materials() + beside +
+                      "[[shafts]]\nname = \"a\"\nposition = [\"0 m\", \"0 m\"]\nheight = \"6 m\"\ndiameter = \"4 m\"\n"
+                      "thickness = \"25 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\nas_outer = \"1 cm2/m\"\n"
+                      "[[stage]]\ntime = \"0.1 s\"\n[[stage.charge]]\nmembers = \"a\"\nposition = \"2 m\"\n"
+                      "destroyed_length = \"2 m\"\nazimuth = \"0 deg\"\nopening = \"290 deg\"\n" +
+                      analysis("8 s")),
+                 default_knowledge(), {}, {});
+    for (const record::Finding& f : r.findings)
+      if (f.id == "mechanism") return f.text;
+    return std::string();
+  };
+  const std::string frame =
+      "[grid]\nrows = { A = \"100 m\", B = \"105 m\" }\nframes = { 1 = \"0 m\" }\n"
+      "[storeys]\nheights = [\"9 m\"]\n[[columns]]\nsection = \"column\"\n"
+      "[[beams]]\nsection = \"beam\"\n";
+  for (const std::string& text : {judge(""), judge(frame)}) {
+    EXPECT_NE(text.find("In the end 100 % of the mass has come down"), std::string::npos) << text;
+  }
+}
+
+TEST(Structures, OneWhoseChargesAllFailIsStillJudged) {
+  const Built b(tower(slender,
+                      second + mouth("2 m", "200 deg") +
+                          "[[stage.charge]]\nmembers = \"low\"\nposition = \"2.5 m\"\ndestroyed_length = \"2 m\"\n"
+                          "azimuth = \"0 deg\"\nopening = \"200 deg\"\nfails = true\n",
+                      "1 s"));
+  ASSERT_EQ(b.map.structures.size(), 2u);
+  EXPECT_EQ(b.map.structures[1].name, "low");
+}
+
 TEST(Structures, APauseIsThatOfThoseWithChargesToCome) {
   std::string later = mouth("2 m", "150 deg");
   later.replace(later.find("0.2 s"), 5, "5 s");

@@ -426,6 +426,15 @@ TEST(StabilityRunPhysics, APauseWhoseNextStageFailsIsJudged) {
   EXPECT_EQ(finding(r, "criterion.stands_between_stages").status, record::Status::Bad);
 }
 
+TEST(StabilityRunPhysics, WhatHasComeToRestIsJudgedBeforeAStageThatFails) {
+  record::Record r;
+  const std::string text = house(charge("C-B2-1", "0 s") + charge("C-A*-0", "20 s", "fails = true"), "30 s") +
+                           "\n[criteria]\nstands_between_stages = true\n";
+  EXPECT_THAT(judge(r, text).text, HasSubstr("found: stands"));
+  EXPECT_LT(r.time.back(), 20) << "it rests before";
+  EXPECT_THAT(finding(r, "stability.stage_1").text, HasSubstr("It stands still."));
+}
+
 TEST(StabilityRunPhysics, APauseThatIsNotSeenIsNotJudged) {
   record::Record r;
   // a second between frames, at the first of which it still stands
