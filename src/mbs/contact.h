@@ -90,6 +90,7 @@ struct PairState {
   double allowed = 0;  // penetration without force [m]
   double depth = 0;    // of the deepest point beyond it at the last look, or minus the gap [m]
   double way = 0;      // State::travel of both bodies then [m]
+  double speed = 0;    // of one of the shapes against the other then, at most [m/s]
   StickRange sticks;
   int group = -1;  // in Touching::group of the last look, -1: did not touch
 };

@@ -598,6 +598,8 @@ class DeadLoad {
   int find_loose_body() const;
   /// What gravity and constant loads push with; 1 if that is nothing [N].
   double calc_weight() const;
+  /// Root mean square of the distances of joints from the centres of mass and of the radii of gyration [m].
+  double calc_length() const;
   /// Of the stiffness with joints held by the penalty. False: a mechanism.
   bool factorise(std::string& message);
   /// What reactions of joints hold bodies with that turn, where it holds: a body that hangs swings back.
@@ -644,6 +646,7 @@ class DeadLoad {
   const Unknowns& u_;
   const std::vector<ZoneState> virgin_, virgin_rotational_;
   double weight_ = 1, penalty_ = 1;
+  double length_ = 1;              // of what turns: makes rotations lengths, torques forces [m]
   double open_gap_ = -1;           // need not close: repeated constraints meet but for the last digits [m, rad]
   double hold_ = 0;                // stiffness by which an open joint counts as a force [N/m]
   double share_ = 1;               // of an iteration's way that is gone
@@ -700,6 +703,24 @@ double DeadLoad::calc_weight() const {
   return weight == 0 ? 1 : weight;
 }
 
+double DeadLoad::calc_length() const {
+  double sum = 0;
+  int count = 0;
+  for (const int b : assembly_.free_bodies()) {
+    const BodyConstants& body = s_.state.body[static_cast<size_t>(b)];
+    sum += (body.inertia(0, 0) + body.inertia(1, 1) + body.inertia(2, 2)) * body.inverse_mass / 2, ++count;
+  }
+  for (const CompiledJoint& j : s_.joints) {
+    const JointFrames f = calc_joint_frames(s_.state, j);
+    for (const bool is_child : {false, true})
+      if (assembly_.place(is_child ? j.child : j.parent) >= 0) {
+        const Vec3 lever = is_child ? f.lever_child : f.lever_parent;
+        sum += dot(lever, lever), ++count;
+      }
+  }
+  return count > 0 && sum > 0 ? std::sqrt(sum / count) : 1;
+}
+
 bool DeadLoad::factorise(std::string& message) {
   const int n = assembly_.count();
   Sparse K;
@@ -713,7 +734,7 @@ bool DeadLoad::factorise(std::string& message) {
       KinematicRow rows[6];
       double gap[6];
       const int count = assembly_.joint_rows(j, rows, gap);
-      for (int i = 0; i < count; ++i) add_outer(rows[i], penalty_, u_, t);
+      for (int i = 0; i < count; ++i) add_outer(rows[i], penalty_ * (i < j.lines ? 1 : length_ * length_), u_, t);
     }
     if (hangs_) add_hanging(t);
     Sparse P(n, n);
@@ -792,9 +813,10 @@ void DeadLoad::find_unbalanced() {
     for (int i = 0; i < count; ++i) {
       const KinematicRow& row = rows[i];
       double& held = multiplier_[j][static_cast<size_t>(i)];
-      held -= share_ * penalty_ * gap[i];
-      pushed_back_[static_cast<Eigen::Index>(6 * j) + i] = -share_ * penalty_ * gap[i];
-      if (const double open = std::isfinite(gap[i]) ? std::abs(gap[i]) : kUnlimited; open > gap_left_)
+      const double turns = i < s_.joints[j].lines ? 1 : length_, penalty = penalty_ * turns * turns;
+      held -= share_ * penalty * gap[i];
+      pushed_back_[static_cast<Eigen::Index>(6 * j) + i] = -share_ * penalty * gap[i];
+      if (const double open = std::isfinite(gap[i]) ? turns * std::abs(gap[i]) : kUnlimited; open > gap_left_)
         gap_left_ = open, most_open_ = j;
       const auto load = [&](Vector& on, double f) {
         for (int k = 0; k < u_.each; ++k) {
@@ -804,7 +826,7 @@ void DeadLoad::find_unbalanced() {
         }
       };
       load(r, held);
-      load(pushed_, held - penalty_ * gap[i]);
+      load(pushed_, held - penalty * gap[i]);
       js.force += held * row.vb;
       if (i >= s_.joints[j].lines) js.moment += held * row.wb;
     }
@@ -812,6 +834,8 @@ void DeadLoad::find_unbalanced() {
   constexpr double wider = 10;  // than at the start
   if (open_gap_ < 0) open_gap_ = wider * gap_left_;
   Eigen::Index most = 0;
+  for (Eigen::Index i = 0; i < r.size(); ++i)
+    if (u_.coordinate(static_cast<int>(i % u_.each)) >= 3) r[i] /= length_;
   r.cwiseAbs().maxCoeff(&most);
   // a largest one does not see what is no number
   unbalanced_ = r.allFinite() ? r.lpNorm<Eigen::Infinity>() / weight_ : kUnlimited;
@@ -942,13 +966,18 @@ bool DeadLoad::find(std::string& message) {
     return false;
   }
   weight_ = calc_weight();
+  length_ = calc_length();
   // joints as stiff as the stiffest body is held: more would turn round-off of places into larger forces
   {
     assembly_.make_stiffness(false, weight_).move_to(first_);
-    for (Eigen::Index i = 0; i < first_.rows(); ++i) penalty_ = std::max(penalty_, first_.coeff(i, i));
+    penalty_ = 0;
+    for (Eigen::Index i = 0; i < first_.rows(); ++i)
+      penalty_ = std::max(
+          penalty_, first_.coeff(i, i) / (u_.coordinate(static_cast<int>(i % u_.each)) < 3 ? 1 : length_ * length_));
+    if (!(penalty_ > 0)) penalty_ = weight_ / length_;
   }
   // places are known to round-off only, and the stiffest spring turns that into a force
-  double extent = 1;
+  double extent = length_;
   for (const int b : assembly_.free_bodies()) extent = std::max(extent, norm(s_.state.p[static_cast<size_t>(b)]));
   // where joints alone hold: the weight opens them by a thousandth at first
   penalty_ = std::max(penalty_, 1e3 * weight_ / extent);
@@ -1081,7 +1110,7 @@ DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
       has_diverged = true;
       break;
     }
-    if (s_.ignores_limits && ((unbalanced_ < 1e-6 && gap_left_ < 1e-6) || round == most / 2)) {
+    if (s_.ignores_limits && ((unbalanced_ < 1e-6 && gap_left_ < 1e-6 * length_) || round == most / 2)) {
       find_most_loaded();
       s_.ignores_limits = false;
       steps = Steps::Plain;
@@ -1089,9 +1118,9 @@ DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
       ++round;
       continue;
     }
-    if (measures_loads_ && unbalanced_ < 1e-6 && gap_left_ < 1e-6) return End::Found;
+    if (measures_loads_ && unbalanced_ < 1e-6 && gap_left_ < 1e-6 * length_) return End::Found;
     is_balanced_ = is_balanced_ || (!s_.ignores_limits && unbalanced_ < good_enough && calc_left() >= good_enough);
-    if (!s_.ignores_limits && unbalanced_ < 1e-11 && gap_left_ < 1e-11) break;
+    if (!s_.ignores_limits && unbalanced_ < 1e-11 && gap_left_ < 1e-11 * length_) break;
     // round-off ends the improvement of very stiff models earlier
     const double left = calc_left();
     idle = left < 0.5 * best ? 0 : idle + 1;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <string_view>
 
 #include "mbs/system.h"
 
@@ -441,6 +442,10 @@ bool System::find_overload(std::string& message) const {
   for (size_t i = 0; i < model.cables.size(); ++i)
     if (state.cable[i].live && state.cable[i].force > model.cables[i].strength)
       return complain("cable \"" + model.cables[i].name + "\"", state.cable[i].force, model.cables[i].strength);
+  for (size_t i = 0; i < joints.size(); ++i)
+    if (const JointOverload over = state.joint[i].live ? find_joint_overload(i) : JointOverload{}; over.what != nullptr)
+      return complain("joint \"" + model.joints[i].name + "\" (" + over.what + ")", over.load, over.limit,
+                      over.what == std::string_view("moment") ? "N·m" : "N");
   return false;
 }
 

@@ -568,27 +568,30 @@ void System::update_angles() {
   }
 }
 
+System::JointOverload System::find_joint_overload(size_t i) const {
+  const CompiledJoint& j = joints[i];
+  const JointState& js = state.joint[i];
+  Vec3 axis = (rotation_of(j.parent) * j.R_PF).column(0);
+  if (j.kind == Joint::Kind::Distance) {
+    const Vec3 line = calc_joint_frames(state, j).gap;
+    axis = (1 / norm(line)) * line;
+  }
+  const double along = dot(axis, js.force), across2 = dot(js.force, js.force) - along * along;
+  if (-along > j.tension_limit) return {"tension", -along, j.tension_limit};
+  if (across2 > j.shear_limit * j.shear_limit) return {"shear", std::sqrt(across2), j.shear_limit};
+  if (dot(js.moment, js.moment) > j.moment_limit * j.moment_limit) return {"moment", norm(js.moment), j.moment_limit};
+  return {};
+}
+
 void System::check_joints() {
   for (size_t i = 0; i < joints.size(); ++i) {
     const CompiledJoint& j = joints[i];
     JointState& js = state.joint[i];
     if (!js.live) continue;
     if (pair_slot[i] != Lanes::kNoSlot && !joint_over[i] && !(std::abs(js.angle) > j.rotation_limit)) continue;
-    Vec3 axis = (rotation_of(j.parent) * j.R_PF).column(0);
-    if (j.kind == Joint::Kind::Distance) {
-      const Vec3 line = calc_joint_frames(state, j).gap;
-      axis = (1 / norm(line)) * line;
-    }
-    const double along = dot(axis, js.force);
-    const double across2 = dot(js.force, js.force) - along * along;
     // a rest, which joints have held too, is no force
-    const bool is_judged = !state.has_rest;
-    if (is_judged && -along > j.tension_limit) {
-      release_joint(i, "tension");
-    } else if (is_judged && across2 > j.shear_limit * j.shear_limit) {
-      release_joint(i, "shear");
-    } else if (is_judged && dot(js.moment, js.moment) > j.moment_limit * j.moment_limit) {
-      release_joint(i, "moment");
+    if (const JointOverload over = state.has_rest ? JointOverload{} : find_joint_overload(i); over.what != nullptr) {
+      release_joint(i, over.what);
     } else if (std::abs(js.angle) > j.rotation_limit &&
                (j.rotational < 0 || state.rotational[static_cast<size_t>(j.rotational)].live)) {
       // a joint whose rotational element has broken turns freely

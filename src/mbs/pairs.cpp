@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 
 #include "mbs/box_kernel.h"
 #include "mbs/contact_kernel.h"
@@ -122,8 +123,13 @@ void System::find_pair_points(double h) {
       }
     }
     // a depth that the bodies cannot have come to since the last look, because another axis counts or because they
-    // overlap at birth, is allowed
-    double possible = pair.depth + way - pair.way;
+    // overlap at birth, is allowed. Ways are those against the mean motion of all bodies; what touches is looked at
+    // each time, and how fast both move against each other is known
+    const auto turning = [&](size_t body) { return fixed[body] ? 0 : norm(now.w[body]) * s.body[body].radius; };
+    const double speed = norm(now.v[a] - now.v[b]) + turning(a) + turning(b);
+    const double fastest = std::max(speed, std::exchange(pair.speed, speed));
+    const double moved = due.touching ? kernel::kSlowed * fastest * h * passed : way - pair.way;
+    double possible = pair.depth + moved;
     pair.way = way;
     const Earnings earnings = pair.group >= 0 ? contact.earnings[static_cast<size_t>(pair.group)] : Earnings{};
     pair.group = -1;

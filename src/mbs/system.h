@@ -597,6 +597,12 @@ class System {
   void pack_pairs();
   void pack_pair(size_t joint, const JointCluster&);
   void take_pairs(double h);
+  /// The limit of a joint that its reaction passes, none: no name [N, N·m].
+  struct JointOverload {
+    const char* what = nullptr;
+    double load = 0, limit = 0;
+  };
+  JointOverload find_joint_overload(size_t joint) const;
   void check_joints();
   /// Closes the joints and makes the velocities agree with them, before the first step.
   void close_joints();
