@@ -264,7 +264,8 @@ class RandomModel {
     cancel_ = &cancel;
     for (std::size_t i = 0; i < points.size() && !cancel.load(std::memory_order_relaxed); ++i) {
       const auto begin = std::chrono::steady_clock::now();
-      refused_.reset();
+      refused_.reset(), silent_.reset();
+      has_done_ = false;
       Result r;
       evaluate_({&points[i], 1}, {&r, 1});
       Answer a;
@@ -273,6 +274,14 @@ class RandomModel {
         return;
       }
       if (r.state == Result::State::NotRun) return;
+      if (silent_ && !has_done_) {
+        // where others have had answers it is a failed point as any
+        silent_->line = r.text;
+        a.kind = Answer::Kind::Refused;
+        a.text = write_refusal(*silent_);
+        give(i, std::move(a));
+        return;
+      }
       a.kind = r.state == Result::State::Done ? Answer::Kind::Done : Answer::Kind::Failed;
       a.text = r.text;
       for (std::size_t k = 0; k < names_.size() && a.kind == Answer::Kind::Done; ++k) {
@@ -407,6 +416,13 @@ class RandomModel {
 
   /// An answer, or its refusal where its outputs are not those of others or lack what is asked for.
   void take(Answer& to, Answer a) {
+    // a program that has not answered yet: some of a point's runs may crash, and which come first must not count
+    if (a.kind == Answer::Kind::Refused)
+      if (const Refusal r = read_refusal(a.text); r.diagnostic.code == no_answer_code) {
+        silent_ = r;
+        a.kind = Answer::Kind::Crashed;
+        a.text = r.line;
+      }
     if (a.kind == Answer::Kind::Done) {
       if (!form_) form_ = form_of(a);
       a = compare_form(a, *form_);
@@ -422,6 +438,7 @@ class RandomModel {
                      fmt::format("such as p({} > 3)", name));
     }
     if (a.kind == Answer::Kind::Refused && !refused_) refused_ = a;
+    has_done_ = has_done_ || a.kind == Answer::Kind::Done;
     to = std::move(a);
   }
 
@@ -446,6 +463,8 @@ class RandomModel {
   uncertainty::Evaluate evaluate_;
   std::optional<AnswerForm> form_;
   std::optional<Answer> refused_;
+  std::optional<Refusal> silent_;  // the program's that has given no answer at all
+  bool has_done_ = false;          // a run of the point has
   const std::atomic<bool>* cancel_ = nullptr;
 };
 

@@ -44,8 +44,8 @@ void normalise(const std::vector<std::vector<double>*>& columns) {
     for (double& v : *c) v = is_constant ? 0 : v / size;
 }
 
-/// Indices from the rows [first, last).
-void calc_indices(const Columns& c, std::size_t first, std::size_t last, std::vector<double>& one,
+/// Indices from the rows [first, last), in parts of the variance `whole`; 0: in parts of that of these rows.
+void calc_indices(const Columns& c, std::size_t first, std::size_t last, double whole, std::vector<double>& one,
                   std::vector<double>& total) {
   double mean = 0, square = 0;
   const double count = static_cast<double>(last - first);
@@ -53,7 +53,7 @@ void calc_indices(const Columns& c, std::size_t first, std::size_t last, std::ve
   mean /= 2 * count;
   for (std::size_t k = first; k < last; ++k)
     square += (c.a[k] - mean) * (c.a[k] - mean) + (c.b[k] - mean) * (c.b[k] - mean);
-  const double variance = square / (2 * count);
+  const double variance = whole > 0 ? whole : square / (2 * count);
   one.assign(c.mixed.size(), 0.0);
   total.assign(c.mixed.size(), 0.0);
   if (!(variance > rounding)) return;
@@ -68,20 +68,53 @@ void calc_indices(const Columns& c, std::size_t first, std::size_t last, std::ve
   }
 }
 
+/// Of the rows in which an input changes something: how many count, and what one of them changes (squares).
+struct Rows {
+  double count = 0, one = 0;
+};
+Rows count_rows(const Columns& c) {
+  double sum = 0, squares = 0;
+  for (std::size_t k = 0; k < c.a.size(); ++k) {
+    double change = 0;
+    for (const auto& m : c.mixed) change += (c.a[k] - m[k]) * (c.a[k] - m[k]);
+    sum += change, squares += change * change;
+  }
+  // none: one would change what is normalised by 1 at most
+  return sum > 0 ? Rows{sum * sum / squares, squares / sum} : Rows{0, 1};
+}
+
+double calc_variance(const std::vector<std::vector<double>*>& columns) {
+  double mean = 0, square = 0, count = 0;
+  for (const auto* column : columns)
+    for (const double v : *column) mean += v, ++count;
+  mean /= count;
+  for (const auto* column : columns)
+    for (const double v : *column) square += (v - mean) * (v - mean);
+  return square / count;
+}
+
 std::vector<Driver> calc_drivers(Columns c) {
   constexpr std::size_t blocks = 8;
+  constexpr double few_rows = 4 * blocks;
   std::vector<Driver> drivers(c.mixed.size());
   std::vector<double> one, total;
   if (c.a.size() < 2) return drivers;
   std::vector<std::vector<double>*> columns = {&c.a, &c.b};
   for (auto& m : c.mixed) columns.push_back(&m);
   normalise(columns);
-  calc_indices(c, 0, c.a.size(), one, total);
+  // Where few rows tell all, as of a rare outcome, A and B may have missed it, blocks without it have a share of 0 and
+  // those with it one of their own variance. All columns know more of the variance, and one row more or less is an
+  // error.
+  const Rows rows = count_rows(c);
+  const double of_all = calc_variance(columns);
+  const bool are_few = rows.count < few_rows && of_all > rounding;
+  const double variance = are_few ? of_all : 0;
+  calc_indices(c, 0, c.a.size(), variance, one, total);
   for (std::size_t i = 0; i < drivers.size(); ++i) drivers[i].first = one[i], drivers[i].total = total[i];
   if (c.a.size() < 2 * blocks) return drivers;
   std::vector<std::vector<double>> ones, totals;
   for (std::size_t b = 0; b < blocks; ++b) {
-    calc_indices(c, b * c.a.size() / blocks, (b + 1) * c.a.size() / blocks, one, total);
+    calc_indices(c, b * c.a.size() / blocks, (b + 1) * c.a.size() / blocks, variance, one, total);
     ones.push_back(one), totals.push_back(total);
   }
   const auto error = [&](const std::vector<std::vector<double>>& of_block, std::size_t i) {
@@ -90,8 +123,11 @@ std::vector<Driver> calc_drivers(Columns c) {
     for (const auto& b : of_block) sum += (b[i] - mean) * (b[i] - mean);
     return std::sqrt(sum / (blocks - 1) / blocks);
   };
-  for (std::size_t i = 0; i < drivers.size(); ++i)
-    drivers[i].first_error = error(ones, i), drivers[i].total_error = error(totals, i);
+  const double row = are_few ? rows.one / (static_cast<double>(c.a.size()) * variance) : 0;
+  for (std::size_t i = 0; i < drivers.size(); ++i) {
+    drivers[i].first_error = std::hypot(error(ones, i), row);
+    drivers[i].total_error = std::hypot(error(totals, i), row / 2);
+  }
   return drivers;
 }
 

@@ -11,8 +11,10 @@
 #include "../product/plan_text.h"
 #include "server.h"
 #include "small_study.h"
+#include "study/evaluator.h"
 #include "study/inputs_file.h"
 #include "study/results.h"
+#include "study/store.h"
 #include "uncertainty/randomness.h"
 #include "wrong_inputs.h"
 
@@ -308,6 +310,33 @@ TEST(RandomInputs, TryCrashedRunsAgainAlone) {
     return b;
   };
   EXPECT_EQ(ask(read(linear), broken, {5, 1}).text, "32 of 200 inner runs failed: signal 11");
+}
+
+TEST(RandomInputs, RunsThatCrashFirstCountAsThoseThatCrashLater) {
+  // a program that has not answered yet is refused after some crashes, one that has is not
+  const auto crashing = [](double beyond, bool is_fresh) -> Model {
+    return [=](const auto& x) {
+      if (x.at("x") <= beyond) return done({{"y", x.at("x")}}, "ok");
+      Refusal r;
+      r.diagnostic = {Severity::Error, no_answer_code, {}, 1, "was started 10 times", ""};
+      r.line = "signal 11";
+      Answer a;
+      a.kind = is_fresh ? Answer::Kind::Refused : Answer::Kind::Crashed;
+      a.text = is_fresh ? write_refusal(r) : r.line;
+      return a;
+    };
+  };
+  const std::string text = product::replaced(linear, "\"p(high)\"", "\"p(ok)\"");
+  const Problem lenient = read(product::replaced(text, "seed = 7", "seed = 7\nmost_failed = 0.2"));
+  const Answer fresh = ask(lenient, crashing(6, true), {5, 1}), later = ask(lenient, crashing(6, false), {5, 1});
+  ASSERT_EQ(fresh.kind, Answer::Kind::Done) << fresh.text;
+  EXPECT_EQ(value_of(fresh, "p(failed)"), 0.16);
+  EXPECT_EQ(fresh.outputs, later.outputs);
+  // none has answered: refused, and where other points have had answers a failed point as any
+  const Answer none = ask(lenient, crashing(-100, true), {5, 1});
+  ASSERT_EQ(none.kind, Answer::Kind::Refused);
+  EXPECT_EQ(read_refusal(none.text).diagnostic.code, no_answer_code);
+  EXPECT_EQ(read_refusal(none.text).line, ask(lenient, crashing(-100, false), {5, 1}).text);
 }
 
 TEST(RandomInputs, RefuseAModelWithoutTheOutputs) {

@@ -87,6 +87,49 @@ TEST(SensitivityReference, SharesOfIshigamiFromSpreadRuns) {
     }
 }
 
+// The outcome x1 < p and x2 < q, and a number that is 0 elsewhere: few rows meet it, and their errors say so.
+TEST(SensitivityPhysics, FewRowsOfARareOutcomeAreNotTakenForCertain) {
+  struct Corner {
+    int rows;
+    double p, q;
+  };
+  for (const Corner c : {Corner{35, 0.15, 0.2}, Corner{256, 0.03, 0.08}, Corner{256, 0.05, 0.1}}) {
+    const Evaluate model = make_evaluate([c](const Point& x) {
+      Result r;
+      r.state = Result::State::Done;
+      r.outcome = x[0] < c.p && x[1] < c.q ? 3 : 1;
+      r.values = {r.outcome == 3 ? 2.0 + x[2] : 0.0};
+      return r;
+    });
+    const double v = c.p * c.q * (1 - c.p * c.q);
+    const double first[] = {c.q * c.q * c.p * (1 - c.p) / v, c.p * c.p * c.q * (1 - c.q) / v, 0};
+    const double total[] = {c.q * c.p * (1 - c.p) / v, c.p * c.q * (1 - c.q) / v, 0};
+    const Space space{std::vector<FuzzyNumber>(3, make_triangular(0, 0.5, 1)), {}, {}};
+    int told = 0, wrong = 0;
+    for (unsigned seed = 0; seed < 100; ++seed) {
+      const Progress progress;
+      Asker asker(model, progress, nullptr, 100000);
+      SensitivityOptions options;
+      options.rows = c.rows;
+      options.seed = seed;
+      const Sensitivity s = find_drivers(space, asker, options);
+      if (s.outcomes.size() < 2) continue;  // no run has met it
+      for (const OutcomeDrivers& o : s.outcomes)
+        for (size_t i = 0; i < 3; ++i) {
+          const Driver& d = o.inputs[i];
+          ++told;
+          wrong += std::abs(d.first - first[i]) > 3 * d.first_error + 0.05;
+          wrong += std::abs(d.total - total[i]) > 3 * d.total_error + 0.05;
+        }
+      const Driver& d = s.outputs[0][1];
+      ++told;
+      wrong += std::abs(d.total - total[1]) > 3 * d.total_error + 0.1;
+    }
+    EXPECT_GT(told, 300) << c.rows;
+    EXPECT_LT(wrong, 0.02 * told) << c.rows << " rows, " << c.p << " by " << c.q << ": " << told;
+  }
+}
+
 // What is the same everywhere has no drivers, and the size of values does not matter.
 TEST(Sensitivity, SharesDoNotHangOnSizeNorOnRounding) {
   const Space space{{make_triangular(0, 1, 3), make_triangular(1, 2, 3)}, {}, {}};
