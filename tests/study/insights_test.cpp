@@ -510,7 +510,7 @@ TEST(Story, SaysWhatIsPossibleAndWhatTurnsIt) {
 // Only x acts on the outcome, in a hundredth of its range, and on the wave; bins are wider than both.
 TEST(InsightsReference, AnInputExplainsAtLeastWhatNoOtherHasAPartIn) {
   const Folder folder;
-  Problem p = make_problem({make_triangular(0, 0.5, 1), make_triangular(0, 0.5, 1), make_triangular(0, 0.5, 1)}, 3000);
+  Problem p = make_problem({make_triangular(0, 0.5, 1), make_triangular(0, 0.5, 1), make_triangular(0, 0.5, 1)}, 6000);
   constexpr double pi = 3.14159265358979323846;
   const StudyResult r =
       run(p, folder, "s", make_factories([](const Point& x) {
