@@ -514,13 +514,16 @@ std::string write_samples_csv(const Problem& p, const StudyResult& r) {
   return text;
 }
 
-std::string write_trajectories_csv(const StudyResult& r) {
+std::string write_trajectories_csv(const Problem& p, const StudyResult& r) {
+  std::vector<double> units;  // of each ordinate
+  for (const Curve& c : list_curves(p, r.alpha.archive)) units.insert(units.end(), c.at.size(), c.unit_value);
   std::string text;
   for (std::size_t i = 0; i < r.alpha.archive.size(); ++i) {
     const Result& result = r.alpha.archive.samples()[i].result;
     if (result.trajectory.empty()) continue;
     text += std::to_string(i);
-    for (const double y : result.trajectory) text += "," + cell(y);
+    for (std::size_t k = 0; k < result.trajectory.size(); ++k)
+      text += "," + cell(result.trajectory[k] / (k < units.size() ? units[k] : 1));
     text += "\n";
   }
   return text;
@@ -667,7 +670,7 @@ std::vector<std::string> write_results(const std::string& folder, const Problem&
   write("requirement.csv", write_requirement_csv(p, r), "requirement,class,runs,");
   write("limits.csv", write_limits_csv(p, r), "output,kind,place,");
   write("samples.csv", write_samples_csv(p, r));
-  write("trajectories.csv", write_trajectories_csv(r), "N,");
+  write("trajectories.csv", write_trajectories_csv(p, r), "N,");
   write("drivers.csv", write_drivers_csv(p, r), "kind,name,input,");
   write("boxes.csv", write_boxes_csv(p, r), "box,kept,input,");
   write("fans.csv", write_fans_csv(p, r), "curve,outcome,alpha,");

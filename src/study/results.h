@@ -37,7 +37,7 @@ std::string write_limits_csv(const Problem&, const StudyResult&);
 /// All runs: inputs, what follows from them, membership, outcome, outputs, why it failed.
 std::string write_samples_csv(const Problem&, const StudyResult&);
 /// Curves of runs, one row each: sample and ordinates; empty if the model gives none.
-std::string write_trajectories_csv(const StudyResult&);
+std::string write_trajectories_csv(const Problem&, const StudyResult&);
 
 /// Which input drives what: output or outcome, input, shares with their standard errors, places, and the outcome's
 /// possibility with the input known. Empty if nothing is known of drivers.

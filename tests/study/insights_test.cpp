@@ -390,6 +390,9 @@ TEST(Fans, PartTrajectoriesByCurveAndOutcome) {
   EXPECT_NEAR(area, 9, 1e-9) << "3 x 3, counter-clockwise";
   EXPECT_NE(write_fans_csv(p, r).find("tilt [deg],,0,1,0,8"), std::string::npos) << write_fans_csv(p, r).substr(0, 300);
   EXPECT_NE(write_debris_csv(p, r).find("outcome,alpha,x [m],y [m]"), std::string::npos);
+  // a run's own curves in the same units: 1, 2, 1 and 1, 1, 2 at the core
+  const std::string own = write_trajectories_csv(p, r);
+  EXPECT_NE(own.find(",2,4,1,1,1,2\n"), std::string::npos) << own.substr(0, 200);
 }
 
 TEST(Fans, ReachFromTheSupportToTheCoreWithoutOutputs) {
