@@ -18,6 +18,7 @@ namespace topple::mbs {
 namespace {
 
 constexpr int kMostContactInterval = 2;
+constexpr size_t kFewBodies = 100;  // that move: points are looked for in each step
 // of a contact's swing from one look for points to the next, at most [rad]
 constexpr double kLookAngle = std::numbers::pi / 10;
 constexpr int kMembersOfNode = 15;  // shapes of a body; more are pieces of one surface
@@ -138,6 +139,8 @@ int System::calc_contact_interval() const {
     return 1;
   const double frequency = calc_contact_frequency();
   if (options.step > 0 || frequency <= 0) return 1;
+  // of few bodies one impact that is met late is much of all energy, and a look costs little
+  if (static_cast<size_t>(std::count(fixed.begin(), fixed.end(), 0)) < kFewBodies) return 1;
   return std::clamp(static_cast<int>(kLookAngle / (frequency * step)), 1, kMostContactInterval);
 }
 
