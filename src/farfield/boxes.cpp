@@ -15,7 +15,8 @@ using product::MemberKind;
 /// Half the extent of the column at a grid point of a storey along an axis; 0 without one [m].
 double calc_half_column(const product::Plan& plan, int storey, int row, int frame, int axis) {
   for (const Member& m : plan.members) {
-    if (m.kind != MemberKind::Column || m.storey != storey || m.row_a != row || m.frame_a != frame) continue;
+    if (m.kind != MemberKind::Column || m.removed || m.storey != storey || m.row_a != row || m.frame_a != frame)
+      continue;
     const product::Section& s = plan.sections[static_cast<size_t>(m.section)];
     return 0.5 * (axis == 0 ? s.width : s.height);
   }

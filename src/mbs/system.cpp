@@ -849,8 +849,8 @@ const View& System::calc_view() {
 void System::look() {
   unpack_elements();
   calc_reactions();
-  if (state.has_rest) {
-    // what the step needs besides is no force of now
+  if (state.has_rest || !forces.loads.empty()) {
+    // the step's share of a table, and what it needs besides, are no force of now
     const Vec3 ground = ground_reaction;
     std::vector<std::pair<Vec3, Vec3>> of_step;
     for (size_t b = 0; b < B; ++b) of_step.emplace_back(force[b], torque[b]);

@@ -446,7 +446,8 @@ struct Evaluation {
   }
 
   /// Flow along the axis. Returns the share of the section that is still there.
-  double flow_axially(const Limits& limits) {
+  double flow_axially(const Limits (&of_stations)[2]) {
+    const Limits& limits = of_stations[0];
     const StationState& strained = most_strained(z);
     double integrity = limits.integrity(z.shortened);
     z.crushed = 0;
@@ -487,7 +488,7 @@ struct Evaluation {
         flowed = true;
       }
       // a hinge that has turned far holds what presses it, and does not pull
-      const bool is_far = std::max(z.station[0].reached, z.station[1].reached) >= limits.law().rupture_rotation;
+      const bool is_far = has_turned_far(of_stations, z);
       double limit = is_far ? 0 : limits.tension(z.elongated, z.shortened);
       if (force[0] > limit) {
         double elongation = (force[0] - limit) / k[0];
@@ -676,7 +677,7 @@ struct Evaluation {
       turned[s] = false;
       if (!is_outside(limits, s, scale)) return z.station[s].strained;
       (void)turn(s, scale);
-      return std::max(z.station[s].strained, strain_of(phi, m, s, limits.law().rotation_ratio));
+      return std::max(z.station[s].strained, strain_of(phi, m, s, limits.rotation_ratio()));
     };
     double begin = z.station[s].strained;
     if (z.station[s].reached == 0) {  // it turns at least as far as there
@@ -811,7 +812,7 @@ struct Evaluation {
       return 0;
     }
     const double axial_stiffness = p.external_axial ? 0 : k[0], relief = p.external_axial ? p.relief : k[0];
-    const auto ratio_of = [&](int q, int s) { return q == 0 ? 1 : limits[s].law().rotation_ratio; };
+    const auto ratio_of = [&](int q, int s) { return q == 0 ? 1 : limits[s].rotation_ratio(); };
     // rotation up to which a station had gone in the step before, by plastic flow or on the flexibility of its damage
     double so_far[2] = {0, 0};
     for (int s = 0; s < n; ++s) {
@@ -1038,9 +1039,8 @@ struct Evaluation {
     cracked = z.cracked_at == time;  // then once is enough
     if (!cracked) crack_stations(h);
     if (crack_inside_bounds(laws)) return;
-    const Limits first_limits(laws, p.law[0], z, time);
-    const double integrity = flow_axially(first_limits);
-    const Limits limits[2] = {first_limits, n > 1 ? Limits(laws, p.law[1], z, time) : first_limits};
+    const Limits limits[2] = {Limits(laws, p.law[0], z, time), Limits(laws, p.law[n > 1 ? 1 : 0], z, time)};
+    const double integrity = flow_axially(limits);
     // what is left of the section carries both the force and the moment
     const double axial = integrity > 0 ? force[0] / integrity : 0;
     for (int s = 0; s < n; ++s) find_limits(limits[s], s, axial, integrity, z.station[s]);
@@ -1056,7 +1056,7 @@ struct Evaluation {
       if (turned[s]) {
         flowed = true;
         st.reached = std::max(st.reached, length_of(phi, m, s));
-        st.strained = std::max(st.strained, strain_of(phi, m, s, law.rotation_ratio));
+        st.strained = std::max(st.strained, strain_of(phi, m, s, limits[s].rotation_ratio()));
       }
       if (st.reached >= (force[0] < 0 || was_far ? law.rupture_rotation_pressed : law.rupture_rotation))
         broke = BreakReason::Rotation;

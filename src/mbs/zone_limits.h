@@ -23,6 +23,8 @@ class Limits {
 
   /// The law that governs lengths of rupture.
   const CompiledLaw& law() const { return share_ > 0 ? to_.get() : from_.get(); }
+  /// In whose measure StationState::strained is: that of the law that comes, from the beginning of a switch on.
+  double rotation_ratio() const { return to_.get().rotation_ratio; }
   double tension(double elongated, double shortened) const {
     return blend(
         [&](const CompiledLaw& l) { return l.buckles && shortened > 0 ? 0.0 : calc_curve(l.tension, elongated); });
@@ -133,6 +135,12 @@ class Limits {
   double share_ = 0;
   double hinge_bears_;
 };
+
+/// Whether a station has turned so far that it holds what presses the zone, and does not pull.
+inline bool has_turned_far(const Limits (&limits)[2], const ZoneState& z) {
+  return z.station[0].reached >= limits[0].law().rupture_rotation ||
+         z.station[1].reached >= limits[1].law().rupture_rotation;
+}
 
 /// The station whose rotation has strained its edges most; a missing one has not turned.
 inline const StationState& most_strained(const ZoneState& z) {

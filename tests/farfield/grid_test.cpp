@@ -119,6 +119,17 @@ TEST(Grid, NeverClosesAMemberThatIsThinnerThanTheReach) {
   EXPECT_NEAR(box.second.x - box.first.x, 0.1, 1e-12);
 }
 
+TEST(Grid, AWallReachesTheAxisOfAColumnThatWasTakenOut) {
+  const auto length = [](const std::string& more) {
+    const product::Plan plan = read(house(more));
+    const auto box = extent_of(make(plan, 0.2), plan.find_member("W-A1A2-1"));
+    return box.second.y - box.first.y;
+  };
+  // columns of 40 cm 4 m apart
+  EXPECT_NEAR(length(""), 3.6, 1e-9);
+  EXPECT_NEAR(length("[preparation]\nremoved = [\"C-A2-1\"]\n"), 3.8, 1e-9);
+}
+
 TEST(Grid, LeavesOpeningsOpen) {
   const product::Plan plan = read(house());
   const Grid g = make(plan, 0.3);

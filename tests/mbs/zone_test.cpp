@@ -193,6 +193,19 @@ TEST(Zone, AnotherLawCountsRotationsItsOwnWay) {
   EXPECT_NEAR(st.strained, st.reached, 1e-12);
 }
 
+TEST(Zone, AnotherMeasureChangesNothingAtTheFirstInstant) {
+  // turned about z alone, which both laws bear alike; the share of the law that comes is still nothing
+  ZoneLaw panel = make_law();
+  panel.rotation_ratio = 0.25;
+  Walk w, as_before;
+  w.laws.push_back(compile_law(panel));
+  for (Walk* one : {&w, &as_before}) one->go(deform(0, 0, 0.03));
+  begin_switch(w.p, w.laws, {.law = 1, .time = 0, .ramp = 1, .stiffness_share = 1}, w.z);
+  for (Walk* one : {&w, &as_before}) one->go(deform(0, 0, 0.031));
+  EXPECT_NEAR(w.moment_z(), as_before.moment_z(), 1e-6 * as_before.moment_z());
+  EXPECT_NEAR(w.z.station[0].strained, 0.25 * as_before.z.station[0].strained, 1e-9);
+}
+
 TEST(Zone, AnotherLawsLimitsHoldAtOnce) {
   ZoneLaw half = make_law();
   for (double& m : half.moment_z.positive) m *= 0.5;
@@ -284,6 +297,32 @@ TEST(Zone, ShortensOrLengthensAsItsRotationGrows) {
     EXPECT_NEAR(w.z.axial, kept + 0.5 * lift * (w.z.station[0].reached - reached), 1e-9);
     EXPECT_NEAR(w.z.energy + w.z.plastic, w.work, 1e-3 * w.work);
   }
+}
+
+TEST(Zone, PullsUntilAStationHasTurnedAsFarAsItsOwnLawAllows) {
+  // the strong station does not turn, the other one by 0.1 rad
+  ZoneLaw strong = make_law(), weak = make_law();
+  for (MomentFamily* f : {&strong.moment_y, &strong.moment_z})
+    for (auto* list : {&f->positive, &f->negative})
+      for (double& m : *list) m *= 100;
+  for (const bool is_weak_first : {false, true})
+    for (const bool is_weak_brittle : {false, true}) {
+      strong.rupture_rotation = is_weak_brittle ? 1 : 0.05;
+      weak.rupture_rotation = is_weak_brittle ? 0.05 : 1;
+      strong.rupture_rotation_pressed = weak.rupture_rotation_pressed = 1;
+      Walk w(is_weak_first ? weak : strong, make_parameters(2, 0));
+      w.laws.push_back(compile_law(is_weak_first ? strong : weak));
+      w.p.law[1] = 1;
+      w.go(deform(-0.1e6 / kStiff, 0, 0.1));
+      ASSERT_TRUE(w.z.live);
+      ASSERT_GT(w.z.station[is_weak_first ? 0 : 1].reached, 0.09);
+      ASSERT_EQ(w.z.station[is_weak_first ? 1 : 0].reached, 0);
+      w.go(deform(w.before.c[0] + 0.15e6 / kStiff, 0, 0.1), 100);
+      if (is_weak_brittle)
+        EXPECT_EQ(w.z.resultant.c[0], 0) << is_weak_first;
+      else
+        EXPECT_GT(w.z.resultant.c[0], 0.02e6) << is_weak_first;
+    }
 }
 
 TEST(Zone, HoldsWhilePressedBeyondItsRupture) {
