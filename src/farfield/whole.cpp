@@ -153,14 +153,18 @@ double calc_distance(const Vec3& p, const Vec3& centre, const Vec3& half) {
 
 }  // namespace
 
-std::vector<std::vector<int>> find_bodies(const Grid& grid, const mbs::Model& model, const collapse::ModelMap& map) {
+std::vector<std::vector<int>> find_bodies(const product::Plan& plan, const Grid& grid, const mbs::Model& model,
+                                          const collapse::ModelMap& map) {
   std::vector<std::vector<int>> bodies(grid.cells.size());
   std::vector<double> away(map.bodies.size());
   for (size_t c = 0; c < grid.cells.size(); ++c) {
     double least = std::numeric_limits<double>::infinity();
+    const bool is_wall = plan.members[static_cast<size_t>(grid.cells[c].member)].kind == product::MemberKind::Wall;
     for (size_t b = 0; b < map.bodies.size(); ++b) {
       away[b] = std::numeric_limits<double>::infinity();
       for (const record::BoxShape& s : map.bodies[b].shapes) {
+        // what a charge takes of a column lies in no shape, and nearer to a wall beside it
+        if (s.part == "wall" && !is_wall) continue;
         const Vec3 centre = model.bodies[b].X_WB * s.X_BS.p;
         away[b] = std::min(away[b], calc_distance(grid.cells[c].centre, centre, s.half));
       }
@@ -213,7 +217,7 @@ Whole make_whole(const product::Plan& plan, const collapse::Knowledge& k, const 
 
   Materials materials(plan, fe.materials);
   const std::vector<double> zone_lengths = calc_zone_lengths(plan, k, map);
-  whole.bodies = find_bodies(grid, model, map);
+  whole.bodies = find_bodies(plan, grid, model, map);
   for (size_t c = 0; c < grid.cells.size(); ++c) {
     const Cell& cell = grid.cells[c];
     const product::Member& m = plan.members[static_cast<size_t>(cell.member)];

@@ -37,7 +37,8 @@ Whole make_whole(const product::Plan&, const collapse::Knowledge&, const GridOpt
 
 /// Bodies of the manager in which each cell lies: whose boxes hold its centre, or are nearest to it. Several where the
 /// centre lies on their border: to give it to one of them would tell left from right. (cells)
-std::vector<std::vector<int>> find_bodies(const Grid&, const mbs::Model&, const collapse::ModelMap&);
+std::vector<std::vector<int>> find_bodies(const product::Plan&, const Grid&, const mbs::Model&,
+                                          const collapse::ModelMap&);
 
 /// What is said of a mesh: counts, edges, step, and how its members fit the plan.
 struct MeshReport {

@@ -136,6 +136,9 @@ void raise_to_bound(std::vector<uncertainty::Driver>& all) {
     const bool may_be = bound - 2 * error <= d.total + 2 * d.total_error;
     if (may_be && bound - 2 * error > d.first + d.first_error)
       d.first = std::min(bound, 1.0), d.first_error = error;
+    // and no more than it does with the others
+    if (d.first - d.total > 2 * std::hypot(d.first_error, d.total_error))
+      d.first = d.total, d.first_error = d.total_error;
   }
 }
 

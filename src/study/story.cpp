@@ -329,6 +329,30 @@ void tell_splits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
 
 /// How possible it is that the requirement is broken, failed runs among them; where the core values break it, that it
 /// is kept.
+/// What whole runs say of a requirement that was searched with condensed ones.
+void weigh_whole_runs(const Problem& p, const StudyResult& r, bool is_core_kept, Sentence& s) {
+  const uncertainty::Classify classify = make_requirement_classes(p, r.outputs, r.outcomes);
+  int compared = 0, against = 0;
+  double possibility = 0;
+  for (const Confirmation::Run& run : r.confirmation.runs) {
+    if (run.whole.state != uncertainty::Result::State::Done) continue;
+    ++compared;
+    if ((classify(run.whole) == kept_class) == is_core_kept) continue;
+    ++against;
+    possibility = std::max(possibility, run.membership);
+  }
+  if (against == 0) return;
+  s.text += is_core_kept ? fmt::format(
+                               " These are condensed runs: {} of {} whole runs break the requirement, which is "
+                               "possible to at least {}.",
+                               against, compared, words_of_least(possibility))
+                         : fmt::format(
+                               " These are condensed runs: {} of {} whole runs keep the requirement, which is "
+                               "possible to at least {}.",
+                               against, compared, words_of_least(possibility));
+  if (is_core_kept) s.status = s.status == Status::Bad || possibility >= 0.5 ? Status::Bad : Status::Warning;
+}
+
 void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
   const std::vector<RequirementClass> classes = list_requirement(p, r);
   if (classes.empty()) return;
@@ -373,6 +397,7 @@ void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Senten
     s.status = found.possibility >= 0.5 ? Status::Bad : Status::Warning;
   else
     s.status = runs > 0 ? Status::Warning : Status::Good;
+  weigh_whole_runs(p, r, is_core_kept, s);
   for (const std::string& name : read_permissible(p.permissible, p).outcomes)
     if (std::find(r.outcomes.begin(), r.outcomes.end(), name) == r.outcomes.end())
       s.text += fmt::format(" No run had the outcome {}.", quoted(name));

@@ -572,6 +572,32 @@ TEST(Story, WeighsARequirementOnNumbers) {
   EXPECT_NE(none.text.find("runs broke it"), std::string::npos) << none.text;
 }
 
+TEST(Story, WeighsARequirementByWholeRunsToo) {
+  const Folder folder;
+  Problem p = make_problem(uncertainty::cases::make_jump_inputs(), 500);
+  p.permissible = "z <= 40";
+  StudyResult r = run(p, folder, "a", make_factories(calc_jump));
+  const auto ask = [&] {
+    const std::vector<Sentence> all = tell(p, r);
+    return *std::find_if(all.begin(), all.end(), [](const Sentence& s) { return s.id == "requirement"; });
+  };
+  ASSERT_EQ(ask().status, record::Status::Good);
+  const auto add = [&](double membership, double z) {
+    Confirmation::Run whole{0, membership, r.alpha.archive[0].result};
+    whole.whole.values = {z};
+    r.confirmation.runs.push_back(whole);
+  };
+  add(1, 39);
+  EXPECT_EQ(ask().status, record::Status::Good);
+  add(0.3, 41);
+  EXPECT_EQ(ask().status, record::Status::Warning);
+  add(0.8, 42);
+  EXPECT_EQ(ask().status, record::Status::Bad);
+  EXPECT_NE(ask().text.find("2 of 3 whole runs break the requirement, which is possible to at least 0.80."),
+            std::string::npos)
+      << ask().text;
+}
+
 std::map<std::string, Sentence> tell_by_id(const Problem& p, const StudyResult& r) {
   std::map<std::string, Sentence> by_id;
   for (const Sentence& s : tell(p, r)) by_id[s.id] = s;

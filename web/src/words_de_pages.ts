@@ -491,6 +491,8 @@ export const germanOfPages: readonly (readonly [string, string])[] = [
   ["Permissible values", "Zulässige Werte"],
   ["No box of inputs was found that keeps it.", "Kein Quader von Eingangswerten wurde gefunden, der es einhält."],
   ["That is of condensed runs: the whole run with these values has the outcome {}.", "Das gilt für verdichtete Rechnungen: Die ganze Rechnung mit diesen Werten hat den Ausgang {}."],
+  ["These are condensed runs: {:d} of {:d} whole runs break the requirement, which is possible to at least {}.", "Das sind verdichtete Rechnungen: {} von {} ganzen Rechnungen verletzen die Anforderung, was mindestens zu {} möglich ist."],
+  ["These are condensed runs: {:d} of {:d} whole runs keep the requirement, which is possible to at least {}.", "Das sind verdichtete Rechnungen: {} von {} ganzen Rechnungen halten die Anforderung ein, was mindestens zu {} möglich ist."],
   ["{:d} of {:d} whole runs have another outcome than the condensed runs with the same values.", "{} von {} ganzen Rechnungen haben einen anderen Ausgang als die verdichteten mit denselben Werten."],
   ["Condensed runs hold until about a second behind the touchdown: reaches, heaps and outcomes at rest are not theirs. Let the runs end earlier ([fuzzy.search] after), or run the study without --condensed.", "Verdichtete Rechnungen gelten bis etwa eine Sekunde nach dem Aufschlag: Reichweiten, Haufwerk und Ausgänge in Ruhe sind nicht ihre. Man lasse die Rechnungen früher enden ([fuzzy.search] after) oder rechne die Studie ohne --condensed."],
   ["Confirmation by whole runs", "Bestätigung durch ganze Rechnungen"],
