@@ -134,8 +134,7 @@ void raise_to_bound(std::vector<uncertainty::Driver>& all) {
       if (&o != &d) others += o.total, squares += o.total_error * o.total_error;
     const double bound = 1 - others, error = std::sqrt(squares);
     const bool may_be = bound - 2 * error <= d.total + 2 * d.total_error;
-    if (may_be && bound - 2 * error > d.first + d.first_error)
-      d.first = std::min(bound, 1.0), d.first_error = error;
+    if (may_be && bound - 2 * error > d.first + d.first_error) d.first = std::min(bound, 1.0), d.first_error = error;
     // and no more than it does with the others
     if (d.first - d.total > 2 * std::hypot(d.first_error, d.total_error))
       d.first = d.total, d.first_error = d.total_error;
