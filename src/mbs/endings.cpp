@@ -27,12 +27,12 @@ System::Ending System::find_ending(double before, double now, double limit) cons
   return find_ending(state.time - find_passing(before, now, limit) * state.last_kick);
 }
 
-void System::impel(int body, const Vec3& impulse, const Vec3& turn) {
+void System::impel(int body, const Vec3& impulse, const Vec3& turn, double rest) {
   if (body < 0 || fixed[static_cast<size_t>(body)]) return;
   if (dot(impulse, impulse) + dot(turn, turn) > 0) state.has_rest = true;
   const size_t b = static_cast<size_t>(body);
   const bool is_planar = model.is_planar;
-  impelled.push_back({b, impulse, turn});
+  impelled.push_back({b, impulse, turn, rest});
   state.v[b] += state.body[b].inverse_mass * (is_planar ? Vec3{impulse.x, 0, impulse.z} : impulse);
   state.L[b] += is_planar ? Vec3{0, turn.y, 0} : turn;
   state.w[b] = calc_world_inverse_inertia(b) * state.L[b];
@@ -52,8 +52,8 @@ double System::end_row(int a, int b, const ForceRow& row, const CompiledCharacte
     damping += 0.5 * (c.damper + braked) * (end - c.deformation);
   }
   pull = ending.rest * (pull + braked);
-  impel(a, pull * row.line, pull * row.turn_a);
-  impel(b, -pull * row.line, -pull * row.turn_b);
+  impel(a, pull * row.line, pull * row.turn_a, ending.rest);
+  impel(b, -pull * row.line, -pull * row.turn_b, ending.rest);
   c.before = c.deformation;
   c.deformation = x;
   c.spring = c.damper = c.rate = 0;
@@ -110,8 +110,8 @@ double System::end_cable(size_t i, const Vec3& p_A, const Vec3& p_B, const Endin
   c.live = false;
   if (length > 0) {
     const Vec3 on_a = (pull / length) * line;
-    impel(k.a.index, on_a, cross(p_A - centre_of(k.a.index), on_a));
-    impel(k.b.index, -on_a, -cross(p_B - centre_of(k.b.index), on_a));
+    impel(k.a.index, on_a, cross(p_A - centre_of(k.a.index), on_a), ending.rest);
+    impel(k.b.index, -on_a, -cross(p_B - centre_of(k.b.index), on_a), ending.rest);
   }
   return 0.5 * last * last / k.stiffness;
 }
@@ -155,8 +155,8 @@ void System::end_pull(int a, int b, const Vec3& on_a, const Vec3& torque_a, cons
   };
   // what it has done since it ended
   state.removed += ending.ago * state.last_kick * (power_on(a, on_a, torque_a) - power_on(b, on_a, torque_b));
-  impel(a, ending.rest * on_a, ending.rest * torque_a);
-  impel(b, -ending.rest * on_a, -ending.rest * torque_b);
+  impel(a, ending.rest * on_a, ending.rest * torque_a, ending.rest);
+  impel(b, -ending.rest * on_a, -ending.rest * torque_b, ending.rest);
 }
 
 }  // namespace topple::mbs

@@ -647,7 +647,7 @@ class DeadLoad {
   const std::vector<ZoneState> virgin_, virgin_rotational_;
   double weight_ = 1, penalty_ = 1;
   double length_ = 1;              // of what turns: makes rotations lengths, torques forces [m]
-  double open_gap_ = -1;           // need not close: repeated constraints meet but for the last digits [m, rad]
+  double open_gap_ = -1;           // need not close: repeated constraints meet but for the last digits [m]
   double hold_ = 0;                // stiffness by which an open joint counts as a force [N/m]
   double share_ = 1;               // of an iteration's way that is gone
   double most_turn_ = kUnlimited;  // of a body in an iteration [rad]
@@ -659,7 +659,7 @@ class DeadLoad {
   std::vector<std::array<double, 6>> multiplier_;
   Vector pushed_back_;                    // what multipliers changed by last (6 per joint)
   Vector pushed_;                         // unbalanced, and gaps pushed back
-  double unbalanced_ = 0, gap_left_ = 0;  // over the weight; [m, rad]
+  double unbalanced_ = 0, gap_left_ = 0;  // over the weight; [m], angles times length_
   bool is_balanced_ = false;              // forces were, and joints open
   size_t most_unbalanced_ = 0;            // body
   size_t most_open_ = 0;                  // joint

@@ -455,6 +455,7 @@ void System::fire_events() {
   if (!state.waiting.empty()) find_triggered(due);
   state.has_rest = false;
   impelled.clear();
+  recentred.clear();
   for (const DueEvent& one : due) {
     act(one);
     state.review_times.push_back(state.time);
@@ -536,12 +537,21 @@ void System::act(const DueEvent& due) {
 void System::replace_body(size_t b, const Body& replacement, const Ending& ending) {
   State& s = state;
   if (fixed[b]) return;
-  // until it was replaced it had the forces of the step before but those that ended with it; contact begins anew
-  Vec3 rest = ending.rest * (force[b] + joint_force[b] - s.pressed[b].force);
-  Vec3 turn = ending.rest * (torque[b] + joint_torque[b] - s.pressed[b].torque);
+  // until it was replaced it had the forces of the step before but those that had ended; contact begins anew
+  Pressed known = s.pressed[b];
+  Vec3 f = force[b] + joint_force[b], t = torque[b] + joint_torque[b];
+  for (const auto& [body, by] : recentred)
+    if (body == b) {
+      t -= cross(by, f);
+      known.torque -= cross(by, known.force), known.damping_torque -= cross(by, known.damping);
+    }
+  Vec3 rest = ending.rest * (f - known.force), turn = ending.rest * (t - known.torque);
   if (model.is_planar) rest.y = turn.x = turn.z = 0;
-  for (const Impelled& one : impelled)
-    if (one.body == b) rest -= one.impulse, turn -= one.turn;
+  for (Impelled& one : impelled)
+    if (one.body == b && one.rest != 0) {
+      const double share = ending.rest / one.rest;
+      rest -= share * one.impulse, turn -= share * one.turn;
+    }
   const Vec3 weighed = ending.rest * model.gravity;
   const double since = ending.ago * s.last_kick;
   const Mat3 R = since > 0 ? to_matrix(exp_rotation(-since * s.w[b])) * Mat3(s.R[b]) : Mat3(s.R[b]);
@@ -559,9 +569,19 @@ void System::replace_body(size_t b, const Body& replacement, const Ending& endin
   const Vec3 moved = R * replacement.X_WB.p, v_new = v + cross(w, moved);
   s.p[b] += s.R[b] * replacement.X_WB.p;
   s.p_offset[b] += replacement.X_WB.p;
+  // the same forces go on; dampers brake the new body no more than to rest
+  const auto kept = [](double change, double speed) { return change > 0 ? speed / (speed + change) : 1; };
+  const Mat3 new_inverse = world_tensor(R, s.body[b].inverse_inertia);
+  Vec3 braked = ending.rest * known.damping, braked_turn = ending.rest * known.damping_torque;
+  if (model.is_planar) braked.y = braked_turn.x = braked_turn.z = 0;
+  rest -= (1 - kept(s.body[b].inverse_mass * norm(braked), norm(v_new))) * braked;
+  turn -= (1 - kept(norm(new_inverse * braked_turn), norm(w))) * braked_turn;
   s.v[b] = v_new - s.body[b].inverse_mass * rest - weighed;
   s.L[b] = world_tensor(R, s.body[b].inertia) * w - (turn - cross(moved, rest));
   s.w[b] = calc_world_inverse_inertia(b) * s.L[b];
+  for (Impelled& one : impelled)
+    if (one.body == b) one.turn -= cross(moved, one.impulse);
+  recentred.emplace_back(b, moved);
   const double after = energy(v_new, w);
   pack_body(b);
   for (const int entry : incidence[b]) {
@@ -609,14 +629,19 @@ void System::push_bodies(double h) {
   evaluate_cables(false);
   evaluate_springs(false);
   evaluate_loads(false);
-  for (const size_t b : replaceable) state.pressed[b] = {-Vec3(force[b]), -Vec3(torque[b])};
+  for (const size_t b : replaceable) state.pressed[b] = {-Vec3(force[b]), -Vec3(torque[b]), {}, {}};
 }
 
 void System::finish_forces(double h) {
   if (!state.crushed_boxes.empty()) shorten_boxes();
   if (model.contact.ground || model.contact.bodies) evaluate_contact(h);
-  for (const size_t b : replaceable) state.pressed[b].force += force[b], state.pressed[b].torque += torque[b];
+  for (const size_t b : replaceable) {
+    Pressed& known = state.pressed[b];
+    known.force += force[b], known.torque += torque[b];
+    known.damping = -Vec3(force[b]), known.damping_torque = -Vec3(torque[b]);
+  }
   evaluate_dampers();
+  for (const size_t b : replaceable) state.pressed[b].damping += force[b], state.pressed[b].damping_torque += torque[b];
   if (model.is_planar) drop_forces_across();
 }
 

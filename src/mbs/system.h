@@ -81,9 +81,9 @@ struct CableState {
   double rest_length = 0, force = 0, energy = 0, plastic = 0;
 };
 
-/// What contact alone gave a body at the last step, about its centre, in W [N, N·m].
+/// What contact alone and dampers alone gave a body at the last step, about its centre, in W [N, N·m].
 struct Pressed {
-  Vec3 force, torque;
+  Vec3 force, torque, damping, damping_torque;
 };
 
 /// Everything that changes in time. Plain data: a copy is a snapshot.
@@ -396,13 +396,17 @@ class System {
   Ending find_ending(double time) const;
   /// When a quantity passed a limit, from its value at the step before and now; now if it was beyond it then.
   Ending find_ending(double before, double now, double limit) const;
-  void impel(int body, const Vec3& impulse, const Vec3& turn);
-  /// What bodies have had at once since the last events began [N s, N m s].
+  /// rest  as Ending::rest, of the force that the impulse is of
+  void impel(int body, const Vec3& impulse, const Vec3& turn, double rest);
+  /// What bodies have had at once since the events of this step began, about their centres of now [N s, N m s, s].
   struct Impelled {
     size_t body;
     Vec3 impulse, turn;
+    double rest;
   };
   std::vector<Impelled> impelled;
+  std::vector<std::pair<size_t, Vec3>>
+      recentred;  // bodies replaced in this step, from the old centre to the new one [m]
   /// Ends the pull of a row at the deformation x; returns what its spring stored then [J].
   double end_row(int a, int b, const ForceRow&, const CompiledCharacteristic& spring,
                  const CompiledCharacteristic& damper, ComponentState&, double x, const Ending&, double& damping);

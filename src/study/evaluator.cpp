@@ -278,7 +278,7 @@ class Evaluator {
       if (event == Process::Event::TimeOut) {
         process_.end();
         // the text stays with the results: nothing that was measured
-        const std::string what = fmt::format("no answer within {} s", timeout_);
+        const std::string what = fmt::format("{} {} s", no_answer_within, timeout_);
         if (!has_answered_ && ++waits_in_vain_ >= most_waits) {
           const std::string all =
               fmt::format("was started {} times and gave no answer within {} s", waits_in_vain_, patience);

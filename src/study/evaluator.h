@@ -19,6 +19,8 @@ Answer read_answer_line(const std::string& line, const std::string& command, int
 /// Of a program that has never answered, though it was started many times. Where its model has answers from elsewhere,
 /// it counts as crashed.
 constexpr const char* no_answer_code = "E828";
+/// How the text of a run that has waited in vain begins.
+constexpr const char* no_answer_within = "no answer within";
 
 /// The complaint of a refused answer, and the line that it points into.
 struct Refusal {

@@ -393,10 +393,13 @@ class RandomModel {
     };
     const auto can_go_on = [&] { return !refused_ && !cancel_->load(std::memory_order_relaxed); };
     if (!points.empty()) run(0, points.size());
-    for (std::size_t i = 0; i < points.size(); ++i)
-      for (int attempt = 2; attempt <= most_attempts && answers[i].kind == Answer::Kind::Crashed && can_go_on();
-           ++attempt)
-        run(i, 1);
+    // a program that has answered none of them, each started once, or that hangs, is given up
+    const auto is_silent = [&](bool were_all_asked) {
+      return silent_ && !has_done_ && (were_all_asked || silent_->line.starts_with(no_answer_within));
+    };
+    for (int attempt = 2; attempt <= most_attempts && !is_silent(attempt > 2); ++attempt)
+      for (std::size_t i = 0; i < points.size() && can_go_on() && !is_silent(false); ++i)
+        if (answers[i].kind == Answer::Kind::Crashed) run(i, 1);
     for (std::size_t i = 0; i < points.size() && !refused_; ++i) {
       Result& r = out[place[i]];
       const Answer& a = answers[i];

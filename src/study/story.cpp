@@ -327,8 +327,6 @@ void tell_splits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
   }
 }
 
-/// How possible it is that the requirement is broken, failed runs among them; where the core values break it, that it
-/// is kept.
 /// What whole runs say of a requirement that was searched with condensed ones.
 void weigh_whole_runs(const Problem& p, const StudyResult& r, bool is_core_kept, Sentence& s) {
   const uncertainty::Classify classify = make_requirement_classes(p, r.outputs, r.outcomes);
@@ -353,6 +351,8 @@ void weigh_whole_runs(const Problem& p, const StudyResult& r, bool is_core_kept,
   if (is_core_kept) s.status = s.status == Status::Bad || possibility >= 0.5 ? Status::Bad : Status::Warning;
 }
 
+/// How possible it is that the requirement is broken, failed runs among them; where the core values break it, that it
+/// is kept.
 void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
   const std::vector<RequirementClass> classes = list_requirement(p, r);
   if (classes.empty()) return;

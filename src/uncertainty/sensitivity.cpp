@@ -68,19 +68,21 @@ void calc_indices(const Columns& c, std::size_t first, std::size_t last, double 
   }
 }
 
-/// Of the rows in which an input changes something: how many count, and what one of them changes (squares).
+/// Of the rows in which an input changes something: how many they are, and what one of them changes (squares).
 struct Rows {
-  double count = 0, one = 0;
+  std::size_t count = 0;
+  double one = 0;
 };
 Rows count_rows(const Columns& c) {
   double sum = 0, squares = 0;
+  std::size_t count = 0;
   for (std::size_t k = 0; k < c.a.size(); ++k) {
     double change = 0;
     for (const auto& m : c.mixed) change += (c.a[k] - m[k]) * (c.a[k] - m[k]);
-    sum += change, squares += change * change;
+    sum += change, squares += change * change, count += change > 0;
   }
   // none: one would change what is normalised by 1 at most
-  return sum > 0 ? Rows{sum * sum / squares, squares / sum} : Rows{0, 1};
+  return sum > 0 ? Rows{count, squares / sum} : Rows{0, 1};
 }
 
 double calc_variance(const std::vector<std::vector<double>*>& columns) {
@@ -95,7 +97,7 @@ double calc_variance(const std::vector<std::vector<double>*>& columns) {
 
 std::vector<Driver> calc_drivers(Columns c) {
   constexpr std::size_t blocks = 8;
-  constexpr double few_rows = 4 * blocks;
+  constexpr std::size_t few_rows = 4 * blocks;
   std::vector<Driver> drivers(c.mixed.size());
   std::vector<double> one, total;
   if (c.a.size() < 2) return drivers;
@@ -107,7 +109,7 @@ std::vector<Driver> calc_drivers(Columns c) {
   // error.
   const Rows rows = count_rows(c);
   const double of_all = calc_variance(columns);
-  const bool are_few = rows.count < few_rows && of_all > rounding;
+  const bool are_few = rows.count < std::min(few_rows, c.a.size()) && of_all > rounding;
   const double variance = are_few ? of_all : 0;
   calc_indices(c, 0, c.a.size(), variance, one, total);
   for (std::size_t i = 0; i < drivers.size(); ++i) drivers[i].first = one[i], drivers[i].total = total[i];

@@ -271,6 +271,61 @@ TEST(ReplacedBody, DoesNotDependOnWhatEndsBeforeOrAfterIt) {
   EXPECT_GT(norm(place[0] - place[1]) / norm(place[2] - place[3]), 11);
 }
 
+/// A body of 1 kg under 100 N from rest, without weight.
+Model make_pushed() {
+  Model m = make_flier();
+  m.bodies[0].v_WB = {};
+  Load l;
+  l.name = "push";
+  l.body = {0};
+  l.force = {100, 0, 0};
+  m.loads.push_back(l);
+  return m;
+}
+
+Event make_replacement(double time, double mass, const Vec3& centre = {}) {
+  Event e = make_event(time, Action::Kind::ReplaceBody);
+  e.actions[0].body = {0};
+  e.actions[0].replacement = make_box("other", mass, {0.1, 0.1, 0.1}, centre);
+  return e;
+}
+
+double find_speed(const Model& m, double until) {
+  Options o;
+  o.duration = until;
+  o.step = o.frame_interval = 1e-3;
+  o.equilibrium = false;
+  double speed = 0;
+  o.on_frame = [&](const View& v) { speed = v.v_WB[0].x; };
+  (void)run(m, o);
+  return speed;
+}
+
+TEST(ReplacedBody, HasNothingOfWhatEndedEarlierInTheStep) {
+  Model m = with(make_sprung(), make_event(0.0301, Action::Kind::RemoveSpring));
+  m = with(m, make_replacement(0.0309, 0.01));
+  // the spring's pull over the 0.8 ms between both would be 0.1 m/s; what it grows by in half a step is 0.002
+  EXPECT_NEAR(find_speed(m, 0.05), kSpeed * std::cos(kOmega * 0.0301), 2e-3);
+}
+
+TEST(ReplacedBody, MayBeReplacedTwiceInAStep) {
+  Model m = with(make_pushed(), make_replacement(0.03, 1, {0, 0, 0.5}));
+  m = with(m, make_replacement(0.03, 1, {0, 0, -0.5}));
+  EXPECT_NEAR(find_speed(m, 0.06), 6, 1e-6);
+}
+
+TEST(ReplacedBody, ThatBecomesLightIsNotThrownBackByItsDamper) {
+  // 100 kg that a damper of 1e4 N s/m stops in 10 ms; 0.1 kg are left of it
+  Model m = make_sprung(1e4);
+  m.springs[0].spring.rate = 0;
+  m.bodies[0].mass = 100;
+  m = with(m, make_replacement(5e-3, 0.1));
+  const Result r = run_to_one(m, 1e-3);
+  // it rings by the way of a step, as beside any damper that stops it within one
+  EXPECT_NEAR(r.place.x, 1 + 0.01 * (1 - std::exp(-0.5)), 1e-3 * std::exp(-0.5));
+  EXPECT_LT(r.energy_error, 0.05);
+}
+
 TEST(Ending, OfASpringWhoseJointComesOffAtItsLimitTurnsNothing) {
   Model m = make_pendulum();
   RotationalSpring r;
