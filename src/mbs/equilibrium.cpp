@@ -662,7 +662,8 @@ class DeadLoad {
   double unbalanced_ = 0, gap_left_ = 0;  // over the weight; [m], angles times length_
   bool is_balanced_ = false;              // forces were, and joints open
   size_t most_unbalanced_ = 0;            // body
-  size_t most_open_ = 0;                  // joint
+  size_t most_open_ = 0;                  // joint, by its gap
+  double widest_ = 0;                     // that [m or rad]
   std::vector<Overload> overloads_;       // without limits, the largest first
   bool measures_loads_ = false;           // laws have no limits
   size_t most_loaded_ = 0;                // element, without limits
@@ -817,7 +818,7 @@ void DeadLoad::find_unbalanced() {
       held -= share_ * penalty * gap[i];
       pushed_back_[static_cast<Eigen::Index>(6 * j) + i] = -share_ * penalty * gap[i];
       if (const double open = std::isfinite(gap[i]) ? turns * std::abs(gap[i]) : kUnlimited; open > gap_left_)
-        gap_left_ = open, most_open_ = j;
+        gap_left_ = open, most_open_ = j, widest_ = std::abs(gap[i]);
       const auto load = [&](Vector& on, double f) {
         for (int k = 0; k < u_.each; ++k) {
           const int c = u_.coordinate(k);
@@ -938,7 +939,7 @@ std::string DeadLoad::describe_failure(bool has_diverged) {
   } else if (unbalanced_ < calc_left()) {
     message =
         fmt::format("no dead-load equilibrium after {} iterations: a gap of {:.2g} m or rad is left in joint \"{}\"",
-                    s_.summary.equilibrium_iterations, gap_left_, s_.model.joints[most_open_].name.substr(0, 60));
+                    s_.summary.equilibrium_iterations, widest_, s_.model.joints[most_open_].name.substr(0, 60));
   } else {
     std::snprintf(words, sizeof words, "is %.2g times the weight", unbalanced_);
     message = message + words + ", of body \"" + s_.model.bodies[most_unbalanced_].name.substr(0, 60) + "\"";
@@ -1077,7 +1078,7 @@ void DeadLoad::note_open_joint() {
       "the equilibrium leaves a gap of {:.2g} m or rad in joint \"{}\", which the first step closes: it is that "
       "of constraints that all but repeat others, or of a joint on so short a lever that the forces that the "
       "run begins with are wrong",
-      gap_left_, s_.model.joints[most_open_].name.substr(0, 60)));
+      widest_, s_.model.joints[most_open_].name.substr(0, 60)));
 }
 
 DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {

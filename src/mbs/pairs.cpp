@@ -122,15 +122,7 @@ void System::find_pair_points(double h) {
         points.gap = std::sqrt(distance2) - reach;
       }
     }
-    // a depth that the bodies cannot have come to since the last look, because another axis counts or because they
-    // overlap at birth, is allowed. Ways are those against the mean motion of all bodies; what touches is looked at
-    // each time, and how fast both move against each other is known
-    const auto turning = [&](size_t body) { return fixed[body] ? 0 : norm(now.w[body]) * s.body[body].radius; };
-    const double speed = norm(now.v[a] - now.v[b]) + turning(a) + turning(b);
-    const double fastest = std::max(speed, std::exchange(pair.speed, speed));
-    const double moved = due.touching ? kernel::kSlowed * fastest * h * passed : way - pair.way;
-    double possible = pair.depth + moved;
-    pair.way = way;
+    const double moved = way - std::exchange(pair.way, way);
     const Earnings earnings = pair.group >= 0 ? contact.earnings[static_cast<size_t>(pair.group)] : Earnings{};
     pair.group = -1;
     if (points.count == 0) {
@@ -143,6 +135,13 @@ void System::find_pair_points(double h) {
       pair.depth = -points.gap;
       continue;
     }
+    // a depth that the bodies cannot have come to since the last look, because another axis counts or because they
+    // overlap at birth, is allowed. Ways are those against the mean motion of all bodies; what touches is looked at
+    // each time, and how fast both move against each other is known
+    const auto turning = [&](size_t body) { return fixed[body] ? 0 : norm(now.w[body]) * s.body[body].radius; };
+    const double speed = norm(now.v[a] - now.v[b]) + turning(a) + turning(b);
+    const double fastest = std::max(speed, std::exchange(pair.speed, speed));
+    double possible = pair.depth + (due.touching ? kernel::kSlowed * fastest * h * passed : moved);
     double deepest = 0;
     for (int i = 0; i < points.count; ++i) deepest = std::max(deepest, points.depth[i]);
     if (!due.touching) {

@@ -41,7 +41,7 @@ void visit(Archive& ar, S& s, C& sys) {
       ar(s.next_event), ar(s.waiting), ar(s.trigger_values);
   ar(s.body), ar(s.p), ar(s.v), ar(s.L), ar(s.w), ar(s.q), ar(s.R), ar(s.p_offset);
   ar(s.shapes), ar(s.crushed_boxes), ar(s.ground_points), ar(s.touched_ground), ar(s.ground_clear), ar(s.ground_box),
-      ar(s.pressed);
+      ar(s.force_parts);
   ar(s.element), ar(s.rotational), ar(s.joint), ar(s.cable);
   ar(s.spring), ar(s.torsion), ar(s.bushing), ar(s.load);
   ar(s.pairs), ar(s.pair_due), ar(s.held_pairs), ar(s.pair_clock), ar(s.pair_fast), ar(s.clock), ar(s.is_fast),

@@ -223,7 +223,7 @@ void System::compile() {
       if (a.kind == Action::Kind::ReplaceBody) replaceable.push_back(static_cast<size_t>(a.body.index));
   std::sort(replaceable.begin(), replaceable.end());
   replaceable.erase(std::unique(replaceable.begin(), replaceable.end()), replaceable.end());
-  s.pressed.resize(B);
+  s.force_parts.resize(B);
 
   incidence.assign(B, {});
   for (size_t e = 0; e < elements.size(); ++e) {
@@ -538,14 +538,14 @@ void System::replace_body(size_t b, const Body& replacement, const Ending& endin
   State& s = state;
   if (fixed[b]) return;
   // until it was replaced it had the forces of the step before but those that had ended; contact begins anew
-  Pressed known = s.pressed[b];
+  ForceParts known = s.force_parts[b];
   Vec3 f = force[b] + joint_force[b], t = torque[b] + joint_torque[b];
   for (const auto& [body, by] : recentred)
     if (body == b) {
       t -= cross(by, f);
-      known.torque -= cross(by, known.force), known.damping_torque -= cross(by, known.damping);
+      known.contact_torque -= cross(by, known.contact), known.damping_torque -= cross(by, known.damping);
     }
-  Vec3 rest = ending.rest * (f - known.force), turn = ending.rest * (t - known.torque);
+  Vec3 rest = ending.rest * (f - known.contact), turn = ending.rest * (t - known.contact_torque);
   if (model.is_planar) rest.y = turn.x = turn.z = 0;
   for (Impelled& one : impelled)
     if (one.body == b && one.rest != 0) {
@@ -629,19 +629,20 @@ void System::push_bodies(double h) {
   evaluate_cables(false);
   evaluate_springs(false);
   evaluate_loads(false);
-  for (const size_t b : replaceable) state.pressed[b] = {-Vec3(force[b]), -Vec3(torque[b]), {}, {}};
+  for (const size_t b : replaceable) state.force_parts[b] = {-Vec3(force[b]), -Vec3(torque[b]), {}, {}};
 }
 
 void System::finish_forces(double h) {
   if (!state.crushed_boxes.empty()) shorten_boxes();
   if (model.contact.ground || model.contact.bodies) evaluate_contact(h);
   for (const size_t b : replaceable) {
-    Pressed& known = state.pressed[b];
-    known.force += force[b], known.torque += torque[b];
+    ForceParts& known = state.force_parts[b];
+    known.contact += force[b], known.contact_torque += torque[b];
     known.damping = -Vec3(force[b]), known.damping_torque = -Vec3(torque[b]);
   }
   evaluate_dampers();
-  for (const size_t b : replaceable) state.pressed[b].damping += force[b], state.pressed[b].damping_torque += torque[b];
+  for (const size_t b : replaceable)
+    state.force_parts[b].damping += force[b], state.force_parts[b].damping_torque += torque[b];
   if (model.is_planar) drop_forces_across();
 }
 

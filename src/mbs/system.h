@@ -82,8 +82,8 @@ struct CableState {
 };
 
 /// What contact alone and dampers alone gave a body at the last step, about its centre, in W [N, N·m].
-struct Pressed {
-  Vec3 force, torque, damping, damping_torque;
+struct ForceParts {
+  Vec3 contact, contact_torque, damping, damping_torque;
 };
 
 /// Everything that changes in time. Plain data: a copy is a snapshot.
@@ -116,7 +116,7 @@ struct State {
   LaneArray<GroundBox> ground_box;  // (B)
   std::vector<unsigned char> touched_ground;
   std::vector<unsigned char> ground_clear;  // no point touches the ground or remembers that it did (B)
-  std::vector<Pressed> pressed;             // of System::replaceable, else nothing (B)
+  std::vector<ForceParts> force_parts;      // of System::replaceable, else nothing (B)
   // connections
   std::vector<ZoneState> element;     // (E + R)
   std::vector<ZoneState> rotational;  // not live and without a reason once its joint is loosened (R)
@@ -405,8 +405,7 @@ class System {
     double rest;
   };
   std::vector<Impelled> impelled;
-  std::vector<std::pair<size_t, Vec3>>
-      recentred;  // bodies replaced in this step, from the old centre to the new one [m]
+  std::vector<std::pair<size_t, Vec3>> recentred;  // bodies replaced in it, from the old centre to the new one
   /// Ends the pull of a row at the deformation x; returns what its spring stored then [J].
   double end_row(int a, int b, const ForceRow&, const CompiledCharacteristic& spring,
                  const CompiledCharacteristic& damper, ComponentState&, double x, const Ending&, double& damping);
