@@ -102,7 +102,7 @@ Task read_member_task(const Arguments& a, std::vector<Diagnostic>& warnings, std
   task.normal_forces = {m.normal_force};
   task.notes.push_back(
       m.is_estimate
-          ? fmt::format("Dead load of {:.4g} MN, by summing up weights: there is no equilibrium ({}).",
+          ? fmt::format("Dead load of {:.4g} MN, by summing up weights: no equilibrium was found ({}).",
                         -m.normal_force / unit::MN, m.message)
           : fmt::format("Dead load of {:.4g} MN from the equilibrium of the building before the first charge.",
                         -m.normal_force / unit::MN));

@@ -65,7 +65,7 @@ stage.1.charge.1.destroyed_length = { triangular = [\"0.8 m\", \"1.2 m\", \"1.6 
   add_test(NAME web_odd_study COMMAND topple study ${odd}/failing.toml --samples 40 --no-drivers -o ${odd}/study)
   set_tests_properties(web_odd_study PROPERTIES DEPENDS web_odd_study_clean)
   set_tests_properties(web_odd_model web_odd_overloaded web_odd_study_clean web_odd_study PROPERTIES LABELS web FIXTURES_SETUP odd_pages TIMEOUT 120)
-  set_tests_properties(web_odd_overloaded PROPERTIES PASS_REGULAR_EXPRESSION "There is no equilibrium under dead load")
+  set_tests_properties(web_odd_overloaded PROPERTIES PASS_REGULAR_EXPRESSION "No equilibrium was found under dead load")
   topple_web_test(web_german_model german.test.mjs BROWSER FIXTURES odd_pages ENVIRONMENT TOPPLE_REPORT=${odd}/model/report.html)
   topple_web_test(web_german_overloaded german.test.mjs BROWSER FIXTURES odd_pages ENVIRONMENT TOPPLE_REPORT=${odd}/overloaded/report.html)
   topple_web_test(web_german_failing german.test.mjs BROWSER FIXTURES odd_pages ENVIRONMENT TOPPLE_STUDY=${odd}/study/study.html)

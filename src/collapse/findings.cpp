@@ -203,7 +203,7 @@ std::string tell_heads(const Context& c, bool is_across) {
   const bool is_about_y = c.map.hinge_about_y != is_across;
   const std::string text = fmt::format(" Heads of ground columns turn about {} here; about {} ", is_about_y ? "y" : "x",
                                        is_about_y ? "x" : "y");
-  if (c.across->zones.empty()) return text + "there is no equilibrium under dead load.";
+  if (c.across->zones.empty()) return text + "no equilibrium was found under dead load.";
   const ZoneFrame& other = (is_across ? c.recorder.zone_frames() : c.across->zones)[0];
   if (!(other.utilisation > 0)) return text + "no zone is loaded.";
   const std::string yielded = count_words(other.yielded, "", "zone has yielded", "zones have yielded");

@@ -32,7 +32,7 @@ void fill_ending(const mbs::Summary& s, const char* when, record::Record& record
       break;
     case Ending::NoEquilibrium:
       record.ending = "failed";
-      record.ending_text = fmt::format("There is no equilibrium under dead load{}: {}.", when, s.message);
+      record.ending_text = fmt::format("No equilibrium was found under dead load{}: {}.", when, s.message);
       break;
     case Ending::Diverged:
       record.ending = "failed";

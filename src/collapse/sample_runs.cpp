@@ -159,7 +159,7 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
   if (s.summary.ending == Ending::NoEquilibrium || s.summary.ending == Ending::Diverged || s.record.time.empty()) {
     out.state = SampleRun::State::Failed;
     out.text = s.summary.ending == Ending::NoEquilibrium
-                   ? "there is no equilibrium under dead load before the first charge: " + s.summary.message
+                   ? "no equilibrium was found under dead load before the first charge: " + s.summary.message
                    : s.summary.message;
     return;
   }

@@ -299,6 +299,8 @@ std::string describe(const Comparison& c, const Record& a, const Record& b) {
   };
   const SeriesPair* share = find_series(c, "connected_share");
   const size_t end_a = share ? find_break_up(share->a) : c.time.size(), end_b = share ? find_break_up(share->b) : end_a;
+  // tilt of an upper block beside that of all bodies says nothing
+  if (c.knows_touchdown_a != c.knows_touchdown_b) tilt = nullptr;
   const auto tilt_at = [&](bool first, size_t i) {
     return i < (first ? end_a : end_b) ? at(tilt, first, i, unit::deg) : kNone;
   };

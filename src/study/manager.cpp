@@ -224,20 +224,25 @@ class Manager {
         model_(calc_model_hash(problem)),
         asked_model_(model_),
         store_(options.store, progress.cancel, options.pool.patience) {
-    const auto there = store_.find_study(options.name);
-    if (there && there->model != model_) refuse(*there);
-    if (there && options.is_new && !are_alike(there->definition, make_study_definition(problem, options)))
-      throw InputError("E822", fmt::format("{} holds another study \"{}\"", hide_password(options.store), options.name),
-                       "give another --name, or go on in that study's own folder");
-    std::vector<StoredResult> results = store_.load_results(model_);
-    const std::vector<std::string> strangers = find_strangers(results);
-    // what is refused changes nothing
-    for (const StoredResult& r : results)
-      if (std::ranges::find(strangers, r.hash) == strangers.end()) check_request(r.answer);
-    if (there && there->state == "finished" && !options.rerun_failed && strangers.empty()) finished_ = *there;
-    store_.put_model(model_, make_model_definition(problem));
+    std::optional<StudyRow> there;
+    std::vector<StoredResult> results;
+    std::vector<std::string> strangers;
     row_ = {options.name, model_, make_study_definition(problem, options), "open", ""};
-    store_.put_study(row_);
+    do {  // until nobody else began or changed a study of this name meanwhile
+      there = store_.find_study(options.name);
+      if (there && there->model != model_) refuse(*there);
+      if (there && options.is_new && !are_alike(there->definition, row_.definition))
+        throw InputError("E822",
+                         fmt::format("{} holds another study \"{}\"", hide_password(options.store), options.name),
+                         "give another --name, or go on in that study's own folder");
+      results = store_.load_results(model_);
+      strangers = find_strangers(results);
+      // what is refused changes nothing
+      for (const StoredResult& r : results)
+        if (std::ranges::find(strangers, r.hash) == strangers.end()) check_request(r.answer);
+      store_.put_model(model_, make_model_definition(problem));
+    } while (!store_.begin_study(row_, there));
+    if (there && there->state == "finished" && !options.rerun_failed && strangers.empty()) finished_ = *there;
     if (options.accepted) options.accepted();
     release_dead_workers(store_);
     store_.forget_refusals(model_);

@@ -229,6 +229,15 @@ TEST(Compare, WritesNoMinusZero) {
   EXPECT_THAT(to_csv(compare(a, b), a), HasSubstr("\r\n0,0,0,0,0,0,,0\r\n"));
 }
 
+TEST(Compare, TellsNoTiltOfABlockBesideThatOfAllBodies) {
+  Record a = make_run("a", 0.25, 5, 1, 0, 1), b = make_run("b", 0.25, 5, 1, 0, 0.9);
+  EXPECT_THAT(describe(compare(a, b), a, b), HasSubstr("  0.25       1.43     1.29"));
+  a.findings.push_back({"touchdown.first", "", "", "", 0.75, "s", Status::Info});
+  const std::string text = describe(compare(a, b), a, b);
+  EXPECT_THAT(text, HasSubstr("  0.25          -        -"));
+  EXPECT_THAT(text, HasSubstr("\nTilt up to 0.75 s: not known of both.\n"));
+}
+
 TEST(Compare, TellsNoTiltOfABlockThatHasBrokenUp) {
   Record a = make_run("a", 0.25, 5, 1, 0, 1), b = make_run("b", 0.25, 5, 1, 0, 0.9);
   a.series.push_back({"connected_share", "", "1", "", {1, 1, 1, 0.5, 0.4}});

@@ -89,7 +89,7 @@ TEST(PlanMapping, CountsWhatBreaksDownAsFailedRuns) {
   EXPECT_EQ(r[3].state, Result::State::Failed);
   EXPECT_THAT(r[3].text, testing::HasSubstr("fct: the formula has no value"));
   EXPECT_EQ(r[4].state, Result::State::Failed);
-  EXPECT_THAT(r[4].text, testing::HasSubstr("no equilibrium under dead load"));
+  EXPECT_THAT(r[4].text, testing::HasSubstr("no equilibrium was found under dead load"));
   EXPECT_TRUE(r[4].values.empty());
   for (const size_t i : {0, 1, 2, 5, 6}) EXPECT_EQ(r[i].state, Result::State::Done) << r[i].text;
 }

@@ -319,6 +319,21 @@ TEST_P(Stores, RememberStudiesAndModels) {
   EXPECT_FALSE(store.find_study("t"));
 }
 
+TEST_P(Stores, BeginAStudyForOneOfThoseWhoSawNone) {
+  Store store(address), other(address);
+  const StudyRow first{"s", "m", "{\"a\": 1}", "open", ""}, second{"s", "n", "{\"b\": 2}", "open", ""};
+  EXPECT_TRUE(store.begin_study(first, std::nullopt));
+  EXPECT_FALSE(other.begin_study(second, std::nullopt));
+  EXPECT_EQ(store.find_study("s")->definition, first.definition);
+  // finished meanwhile it is still the same one
+  store.put_study({"s", "m", first.definition, "finished", "{}"});
+  EXPECT_TRUE(other.begin_study(second, first));
+  EXPECT_EQ(store.find_study("s")->model, "n");
+  EXPECT_EQ(store.find_study("s")->state, "open");
+  EXPECT_FALSE(store.begin_study(first, first));
+  EXPECT_EQ(store.find_study("s")->definition, second.definition);
+}
+
 TEST_P(Stores, FinishEveryJobOnceAmongManyWorkers) {
   constexpr int count = 300, threads = 6;
   {
