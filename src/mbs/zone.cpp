@@ -655,21 +655,44 @@ struct Evaluation {
     return turns[q][s] - z.station[s].bow[q] - z.station[s].crack[q] * moments[q][s];
   }
 
+  /// Takes back what a station has turned in this step, as the other one is; both spring back.
+  void turn_back(int s) {
+    for (int q = first; q <= last; ++q) {
+      for (int i = 0; i < n; ++i) phi[q][i] -= z.station[i].soft[q] * m[q][i];
+      phi[q][s] = z.station[s].phi[q];
+      spring_back(q);
+    }
+    for (int i = 0; i < n; ++i) measure(i);
+    turned[s] = false;
+  }
+
+  /// One station after the other, each anew as the other one is.
+  ///   still  share of a rotation by which none moves any more
+  ///   turn_anew  turns a station, which has not turned in this step
+  template <class Turn>
+  void take_turns(int most_sweeps, double still, const Turn& turn_anew) {
+    for (int sweep = 0; sweep < most_sweeps; ++sweep) {
+      bool changed = false;
+      for (int s = 0; s < n; ++s) {
+        double before[2] = {0, 0};
+        for (int q = first; q <= last; ++q) before[q] = phi[q][s];
+        turn_back(s);
+        turn_anew(s);
+        for (int q = first; q <= last; ++q)
+          changed = changed || std::abs(phi[q][s] - before[q]) > still * std::abs(phi[q][s]);
+      }
+      if (n == 1 || !changed) break;
+    }
+  }
+
   /// Turns a station alone from where it was before until its moments stand on the limits of the rotation that it comes
   /// to, the first one that does on the way.
   ///   peak  not less than limits at any rotation [q][s]
   void turn_onto_law(const Limits& limits, int s, double axial, double integrity, const MomentLimit (&peak)[2][2]) {
     StationState ahead = z.station[s];
     double start[2][2] = {}, moment[2][2] = {}, scale[2];  // [q][s]
-    for (int q = first; q <= last; ++q) {
-      for (int i = 0; i < n; ++i) phi[q][i] -= z.station[i].soft[q] * m[q][i];
-      phi[q][s] = z.station[s].phi[q];
-      spring_back(q);
-      for (int i = 0; i < n; ++i) start[q][i] = phi[q][i];
-    }
-    for (int i = 0; i < n; ++i) measure(i);
     for (int q = first; q <= last; ++q)
-      for (int i = 0; i < n; ++i) moment[q][i] = m[q][i];
+      for (int i = 0; i < n; ++i) start[q][i] = phi[q][i], moment[q][i] = m[q][i];
     // rotation that the station comes to under the limits that are set
     const auto turn_to_limits = [&] {
       for (int q = first; q <= last; ++q)
@@ -703,17 +726,7 @@ struct Evaluation {
         peak[q][s].positive *= integrity;
         peak[q][s].negative *= integrity;
       }
-    for (int sweep = 0; sweep < most_sweeps; ++sweep) {
-      bool changed = false;
-      for (int s = 0; s < n; ++s) {
-        double before[2] = {0, 0};
-        for (int q = first; q <= last; ++q) before[q] = phi[q][s];
-        turn_onto_law(limits[s], s, axial, integrity, peak);
-        for (int q = first; q <= last; ++q)
-          changed = changed || std::abs(phi[q][s] - before[q]) > still * std::abs(phi[q][s]);
-      }
-      if (n == 1 || !changed) break;
-    }
+    take_turns(most_sweeps, still, [&](int s) { turn_onto_law(limits[s], s, axial, integrity, peak); });
   }
 
   /// Bending at the stations: radial return on (|My|/Ly)^p + (|Mz|/Lz)^p = 1.
@@ -744,21 +757,9 @@ struct Evaluation {
       }
     }
     if (!outside[0] || !outside[1] || turn_both(scale)) return;
-    // in turns
-    constexpr int most_sweeps = 12;
-    constexpr double still = 1e-11;  // share of a rotation
-    for (int sweep = 0; sweep < most_sweeps; ++sweep) {
-      bool changed = false;
-      for (int s = 0; s < 2; ++s) {
-        double before[2] = {0, 0};
-        for (int q = first; q <= last; ++q) before[q] = phi[q][s];
-        measure(s);
-        if (is_outside(limits[s], s, scale[s])) (void)turn(s, scale[s]);
-        for (int q = first; q <= last; ++q)
-          changed = changed || std::abs(phi[q][s] - before[q]) > still * std::abs(phi[q][s]);
-      }
-      if (!changed) break;
-    }
+    take_turns(12, 1e-11, [&](int s) {
+      if (is_outside(limits[s], s, scale[s])) (void)turn(s, scale[s]);
+    });
   }
 
   /// Both stations at once: two by two in each plane. False, and nothing changed, if that would bring work.

@@ -586,6 +586,38 @@ TEST(Zone, AStationThatDoesNotTurnSpringsBack) {
   EXPECT_NEAR(w.z.station[1].phi[1], damaged.phi[1], 1e-12);
 }
 
+TEST(Zone, ItDoesNotMatterWhichStationIsListedFirst) {
+  // random walks about both axes at once
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> even(-1, 1);
+  constexpr int bending[] = {1, 2, 4, 5};
+  for (const double damage : {0.0, 0.3}) {
+    double turned = 0;
+    for (int walk = 0; walk < 8; ++walk) {
+      ZoneLaw law = test::plastic_hinge(100e3);
+      law.moment_y = law.moment_z, law.damage_share = damage;
+      Walk one(law, test::make_member()), other(law, test::make_member());
+      std::swap(other.p.x[0], other.p.x[1]);
+      for (int leg = 0; leg < 6; ++leg) {
+        const Six from = one.before;
+        Six to;
+        for (int c : bending) to.c[c] = 0.02 * even(random);
+        for (int i = 1; i <= 200; ++i) {
+          Six at = from;
+          for (int c : bending) at.c[c] += (to.c[c] - from.c[c]) * i / 200;
+          one.go(at, 1), other.go(at, 1);
+          for (int c : bending)
+            ASSERT_NEAR(one.z.resultant.c[c], other.z.resultant.c[c], 1e-7 * 100e3)
+                << damage << " " << walk << " " << i;
+        }
+      }
+      for (int s : {0, 1})
+        turned = std::max(turned, std::min(one.z.station[s].reached, other.z.station[1 - s].reached));
+    }
+    EXPECT_GT(turned, 0.01);
+  }
+}
+
 TEST(Zone, NeverGivesBackWhatWasDissipated) {
   // random walks of two stations, damaged to different shares
   std::mt19937 random(5);
