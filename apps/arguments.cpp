@@ -463,6 +463,7 @@ void add_study(CLI::App& app, Arguments& a) {
   add_language(study, a);
   add_language(study_export, a);
   study_show->add_flag("--json", a.json, "as a JSON object");
+  add_json(study_export, a);
   study_export->add_option("-o,--output", a.output, "folder for the files; the study's own if left out")
       ->type_name("FOLDER");
   study->callback([&a] { a.verb = Arguments::Verb::Study; });
@@ -526,6 +527,7 @@ void add_doctor(CLI::App& app, Arguments& a) {
 
 void add_version(CLI::App& app, Arguments& a) {
   CLI::App* version = app.add_subcommand("version", "Show the version.");
+  add_json(version, a);
   version->callback([&a] { a.verb = Arguments::Verb::Version; });
   add_examples(version, R"(  topple version)");
 }

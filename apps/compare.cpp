@@ -16,6 +16,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/unit.h"
+#include "collapse/findings.h"
 #include "commands.h"
 #include "engines/engine.h"
 #include "mbs/model_json.h"
@@ -133,6 +134,13 @@ class Table {
   std::vector<size_t> widths_;
 };
 
+/// What a run says of itself, advice on its step included.
+std::vector<std::string> notes_of(const mbs::Summary& s) {
+  std::vector<std::string> notes = s.notes;
+  if (s.step_needed > 0) notes.push_back(collapse::describe_step_needed(s));
+  return notes;
+}
+
 void print_table(const mbs::Model& model, const Comparison& c) {
   const EngineRun* first = nullptr;
   std::vector<std::string> heads;
@@ -226,7 +234,7 @@ json to_json(const mbs::Model& model, const Comparison& c) {
       j["energy_error"] = r.summary.energy_error;
       j["joint_drift"] = r.summary.joint_drift;
       j["broken"] = r.broken;
-      j["notes"] = r.summary.notes;
+      j["notes"] = notes_of(r.summary);
       if (!r.time.empty()) {
         j["position"] = to_json(model, r.position);
         j["orientation"] = to_json(model, r.orientation);
@@ -303,7 +311,7 @@ int compare_engines(const Arguments& a, const std::atomic<bool>& cancel) {
         if (!r.has_run()) continue;
         if (r.summary.ending == Ending::Diverged || r.summary.ending == Ending::NoEquilibrium)
           std::printf("\n%s: %s\n", r.name.c_str(), r.summary.message.c_str());
-        for (const std::string& note : r.summary.notes) std::printf("\n%s: %s\n", r.name.c_str(), note.c_str());
+        for (const std::string& note : notes_of(r.summary)) std::printf("\n%s: %s\n", r.name.c_str(), note.c_str());
       }
     }
     if (!a.output.empty()) {

@@ -120,7 +120,8 @@ int dispatch(const topple::apps::Arguments& a) {
     case Arguments::Verb::Doctor:
       return topple::apps::examine(a, cancel);
     case Arguments::Verb::Version:
-      std::printf("topple %s\n", topple::apps::program_version().c_str());
+      std::printf(a.json ? "{\"program\": \"topple\", \"version\": \"%s\"}\n" : "topple %s\n",
+                  topple::apps::program_version().c_str());
       return topple::apps::kOk;
     case Arguments::Verb::None:
       break;

@@ -195,10 +195,12 @@ int run_study_command(const Arguments& a, const std::atomic<bool>& cancel) {
       check_target(folder, place);
       make_folder(folder);
       const nlohmann::json definition = nlohmann::json::parse(row->definition);
-      write_all(stdout, folder, problem, r, definition.value("text", ""), definition.value("file", ""), a.language);
-    } else if (a.json) {
+      write_all(a.json ? stderr : stdout, folder, problem, r, definition.value("text", ""),
+                definition.value("file", ""), a.language);
+    }
+    if (a.json) {
       std::fputs(study::write_results_json(problem, r).c_str(), stdout);
-    } else {
+    } else if (a.study.action == StudyArguments::Action::Show) {
       print_study(stdout, problem, r);
       const study::Counts c = store.count(row->model);
       if (!r.is_finished) std::printf("\nwaiting %ld, running %ld\n", c.waiting, c.running);

@@ -1,6 +1,7 @@
 #include "collapse/live_run.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "base/error.h"
 #include "collapse/plan_record.h"
@@ -22,7 +23,7 @@ LiveRun::LiveRun(std::shared_ptr<const LiveModel> model, const RunOptions& optio
     if (on_event) on_event(e);
   };
   const mbs::Model& m = model_->model();
-  keeps_paths_ = m.elements.size() <= kMostPaths;
+  keeps_paths_ = m.elements.size() + m.rotational_elements.size() <= kMostPaths;
   fill_provenance(options_, "native", *record_);
   fill_from_plan(model_->plan(), m, model_->map(), *record_);
   recorder_ = std::make_unique<Recorder>(m, model_->map(), model_->knowledge(), *record_, callbacks_);
@@ -70,11 +71,18 @@ void LiveRun::add_frame(const mbs::View& v) {
   frame_steps_.push_back(simulation_->steps());
   frame_seconds_.push_back(seconds());
   cable_force_ = v.cable_force;
-  if (keeps_paths_)
+  if (keeps_paths_) {
+    const auto add = [this](double N, double My, double Mz, double ry, double rz) {
+      for (const double x : {N, My, Mz, ry, rz}) zone_path_.push_back(static_cast<float>(x));
+    };
+    // moments of a law have the signs of its rotations, forces of a on b the other ones
     for (size_t e = 0; e < v.element_force.size(); ++e)
-      for (const double x : {v.element_force[e].x, v.element_moment[e].y, v.element_moment[e].z,
-                             v.element_rotation[e].y, v.element_rotation[e].z})
-        zone_path_.push_back(static_cast<float>(x));
+      add(-v.element_force[e].x, -v.element_moment[e].y, -v.element_moment[e].z, v.element_rotation[e].y,
+          v.element_rotation[e].z);
+    constexpr double none = std::numeric_limits<double>::quiet_NaN();
+    for (size_t r = 0; r < v.hinge_moment.size(); ++r)
+      add(v.hinge_normal[r], none, -v.hinge_moment[r], none, v.hinge_rotation[r]);
+  }
   if (on_frame) on_frame();
 }
 

@@ -478,17 +478,20 @@ class Dataset {
       return id > 0 ? fmt::format("DEACTIVATE/{}, ID = {}\n", kind, id) : std::string();
     };
     const auto of = [](const std::vector<int>& ids, int index) { return ids[static_cast<size_t>(index)]; };
+    const auto off_element = [&](const mbs::Action& e) {
+      return e.rotational >= 0 ? off("SFORCE", of(rotational_, e.rotational))
+                               : off("BUSHING", of(element_, e.element.index));
+    };
     switch (a.kind) {
       case Kind::RemoveElement:
-        return off("BUSHING", of(element_, a.element.index));
+        return off_element(a);
       case Kind::SwitchLaw:
         if (a.stiffness_share >= 1) {
           losses_.add("a zone near a charge keeps its law: what the charge takes of it is left out");
           return {};
         }
         losses_.add("a charge takes its zone away at once: the bars that it leaves resist nothing");
-        return a.rotational >= 0 ? off("SFORCE", of(rotational_, a.rotational))
-                                 : off("BUSHING", of(element_, a.element.index));
+        return off_element(a);
       case Kind::ReleaseJoint:
         return off("JOINT", joint_[static_cast<size_t>(a.joint.index)].id);
       case Kind::ReplaceBody:

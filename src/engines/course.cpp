@@ -375,7 +375,7 @@ void Course::act(const mbs::Event& event, const mbs::Action& a) {
   const size_t index = static_cast<size_t>(std::max(a.index, 0));
   switch (a.kind) {
     case Kind::RemoveElement:
-      return forces_.remove_element(static_cast<size_t>(a.element.index));
+      return forces_.remove_element(a);
     case Kind::SwitchLaw:
       return forces_.switch_law(a, event.triggers.empty() ? event.time : time_);
     case Kind::ReleaseJoint:

@@ -534,8 +534,13 @@ bool Forces::break_others(double time, const Motion& motion) {
 
 // --- events
 
-void Forces::remove_element(size_t i) {
-  mbs::ZoneState& z = zone_[i].state;
+Forces::Zone& Forces::zone_of(const mbs::Action& a) {
+  return a.rotational >= 0 ? rotational_[static_cast<size_t>(a.rotational)]
+                           : zone_[static_cast<size_t>(a.element.index)];
+}
+
+void Forces::remove_element(const mbs::Action& a) {
+  mbs::ZoneState& z = zone_of(a).state;
   is_cached_ = false;
   if (!z.live) return;
   removed_ += z.energy + z.damper_energy;
@@ -544,8 +549,7 @@ void Forces::remove_element(size_t i) {
 }
 
 void Forces::switch_law(const mbs::Action& a, double time) {
-  auto& z =
-      a.rotational >= 0 ? rotational_[static_cast<size_t>(a.rotational)] : zone_[static_cast<size_t>(a.element.index)];
+  Zone& z = zone_of(a);
   is_cached_ = false;
   mbs::begin_switch(z.parameters, laws_, {a.law.index, time, a.ramp, a.stiffness_share}, z.state);
 }
@@ -699,11 +703,24 @@ void Forces::fill(double time, const Motion& motion, mbs::View& v) const {
     v.element_translation[i] = three(g.deformation.c);
     v.element_rotation[i] = three(g.deformation.c + 3);
   }
-  for (size_t i = 0; i < R; ++i) fill_zone(E + i, time, rotational_[i], v);
+  v.hinge_rotation.resize(R);
+  v.hinge_moment.resize(R);
+  v.hinge_normal.resize(R);
+  for (size_t i = 0; i < R; ++i) {
+    const Zone& z = rotational_[i];
+    fill_zone(E + i, time, z, v);
+    v.hinge_rotation[i] = z.is_loose && z.state.live ? z.state.deformation[5]
+                                                     : angle_of(motion, model_.rotational_elements[i].joint, z.angle);
+    v.hinge_moment[i] = -z.state.resultant.c[5];
+    v.hinge_normal[i] = !z.state.live ? 0 : z.is_loose ? z.state.resultant.c[0] : z.axial_force;
+  }
   v.cable_force.resize(rope_.size());
+  v.cable_length.resize(rope_.size());
   for (size_t i = 0; i < rope_.size(); ++i) {
     const mbs::Cable& c = model_.cables[i];
-    const double stretch = norm(pose_of(motion, c.b) * c.p_B - pose_of(motion, c.a) * c.p_A) - rope_[i].rest_length;
+    const double length = norm(pose_of(motion, c.b) * c.p_B - pose_of(motion, c.a) * c.p_A);
+    const double stretch = length - rope_[i].rest_length;
+    v.cable_length[i] = length;
     v.cable_force[i] = rope_[i].live && stretch > 0 ? c.stiffness * stretch : 0;
   }
   v.spring_length.resize(spring_.size());

@@ -57,7 +57,7 @@ class Forces {
   void renew(double time, const Motion&);
 
   // Events; they count from the next evaluation on.
-  void remove_element(size_t);
+  void remove_element(const mbs::Action&);
   void switch_law(const mbs::Action&, double time);
   /// Whether the joint's rotational element holds no longer; false if it has none.
   bool has_broken_hinge(size_t joint) const;
@@ -132,6 +132,7 @@ class Forces {
     Vec3 r;
   };
 
+  Zone& zone_of(const mbs::Action&);
   void evaluate(double time, const Motion&, std::vector<Wrench>& on_body) const;
   void prepare(mbs::ZoneParameters&, double h) const;
   Pose pose_of(const Motion&, mbs::BodyId) const;

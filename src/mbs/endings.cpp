@@ -136,6 +136,17 @@ void System::end_rotational(size_t r, const Ending& ending) {
   end_pull(j.parent, j.child, {}, on_parent, on_parent, ending);
 }
 
+void System::remove_rotational(size_t r, const Ending& ending) {
+  ZoneState& z = state.rotational[r];
+  if (!z.live) return;
+  end_rotational(r, ending);
+  if (!z.live) return;
+  state.removed += z.energy + z.damper_energy;
+  z.energy = z.damper_energy = 0;
+  break_zone(z, BreakReason::Removed);
+  mark_links_due();
+}
+
 void System::end_joint(size_t i, const Ending& ending) {
   const JointState& js = state.joint[i];
   if (!js.live) return;

@@ -223,6 +223,8 @@ struct Quantity {
     ElementRotation,     // zone element [rad]
     ElementForce,        // zone element: of a on b, in its axes [N]
     ElementMoment,       // zone element [N·m]
+    HingeRotation,       // rotational element: of its joint [rad]
+    HingeMoment,         // rotational element: of the parent on the child, about Fz [N·m]
     BushingTranslation,  // bushing, as of a zone element
     BushingRotation,
     BushingForce,
@@ -231,6 +233,7 @@ struct Quantity {
     SpringForce,    // spring-damper, pull positive, damper included [N]
     TorsionAngle,   // rotational spring: angle - free_angle [rad]
     TorsionTorque,  // rotational spring, damper included [N·m]
+    CableLength,    // cable: between its ends [m]
     CableForce      // cable [N]
   };
   Kind kind = Kind::Position;
@@ -255,7 +258,7 @@ struct Output {
 /// What an event does.
 struct Action {
   enum class Kind {
-    RemoveElement,  // element
+    RemoveElement,  // element, or rotational
     SwitchLaw,      // element: the limits of all its stations go over to those of `law` within `ramp`
     ReleaseJoint,   // joint
     ReplaceBody,   // body: mass, inertia and shapes of `replacement`; X_WB of it is its new centre of mass in the old B
@@ -273,7 +276,7 @@ struct Action {
   BodyId body;
   int cable = -1;
   int index = -1;       // spring, rotational spring, bushing or load
-  int rotational = -1;  // SwitchLaw: a rotational element instead of an element
+  int rotational = -1;  // RemoveElement, SwitchLaw: a rotational element instead of an element
   LawId law;
   double ramp = 0;             // [s]
   double stiffness_share = 1;  // SwitchLaw: of the element's own stiffness after the ramp, (0, 1000]

@@ -131,6 +131,8 @@ class Checker {
   void check_loads();
   void check_contact();
   void check_events();
+  /// Whether the element that an action names is there, a zone element or a rotational one.
+  bool element(const Place&, const Action&);
   void check_action(const Place& p, const Action&);
   void check_outputs();
   /// Whether the joints are closed at the start; ids and poses must be good.
@@ -461,6 +463,8 @@ void Checker::check_contact() {
   const Contact& c = m_.contact;
   const Place p{"contact", {}};
   if (!(std::abs(norm(c.normal) - 1) < 1e-9)) fail(p, "normal", "is not a unit vector");
+  if (m_.is_planar && std::abs(c.normal.y) > 1e-9)
+    fail(p, "normal", "has a part along y, and bodies of a planar model do not move along it");
   finite(p, "offset", c.offset);
   finite_not_negative(p, "friction", c.friction);
   finite_not_negative(p, "body_friction", c.body_friction);
@@ -489,13 +493,14 @@ void Checker::quantity(const Place& p, const Quantity& q) {
   using JointKind = Joint::Kind;
   const char* item = traits_of(q.kind).item;
   const std::string_view of = item;
-  const size_t count = of == "body"      ? m_.bodies.size()
-                       : of == "joint"   ? m_.joints.size()
-                       : of == "element" ? m_.elements.size()
-                       : of == "bushing" ? m_.bushings.size()
-                       : of == "spring"  ? m_.springs.size()
-                       : of == "cable"   ? m_.cables.size()
-                                         : m_.rotational_springs.size();
+  const size_t count = of == "body"         ? m_.bodies.size()
+                       : of == "rotational" ? m_.rotational_elements.size()
+                       : of == "joint"      ? m_.joints.size()
+                       : of == "element"    ? m_.elements.size()
+                       : of == "bushing"    ? m_.bushings.size()
+                       : of == "spring"     ? m_.springs.size()
+                       : of == "cable"      ? m_.cables.size()
+                                            : m_.rotational_springs.size();
   if (q.index < 0 || static_cast<size_t>(q.index) >= count)
     return fail(p, item, fmt::format("names number {}; there are {}", q.index, count));
   if (q.kind != Kind::JointAngle && q.kind != Kind::JointDisplacement) return;
@@ -506,21 +511,23 @@ void Checker::quantity(const Place& p, const Quantity& q) {
     fail(p, "quantity", "only prismatic and cylindrical joints have a displacement");
 }
 
+bool Checker::element(const Place& p, const Action& a) {
+  if (a.rotational < 0) return index(p, "element", a.element.index, m_.elements);
+  if (a.element.is_valid()) fail(p, "", "names an element and a rotational element");
+  return index(p, "rotational", a.rotational, m_.rotational_elements);
+}
+
 void Checker::check_action(const Place& p, const Action& a) {
   switch (a.kind) {
     case Action::Kind::RemoveElement:
-      index(p, "element", a.element.index, m_.elements);
+      (void)element(p, a);
       break;
     case Action::Kind::SwitchLaw: {
-      if (a.rotational >= 0) {
-        if (a.element.is_valid()) fail(p, "", "names an element and a rotational element");
-        if (index(p, "rotational", a.rotational, m_.rotational_elements) &&
-            !m_.rotational_elements[static_cast<size_t>(a.rotational)].law.is_valid())
-          fail(p, "rotational", "has no law that could change");
-      } else if (index(p, "element", a.element.index, m_.elements) &&
-                 m_.elements[static_cast<size_t>(a.element.index)].stations.empty()) {
+      const bool is_there = element(p, a);
+      if (is_there && a.rotational >= 0 && !m_.rotational_elements[static_cast<size_t>(a.rotational)].law.is_valid())
+        fail(p, "rotational", "has no law that could change");
+      if (is_there && a.rotational < 0 && m_.elements[static_cast<size_t>(a.element.index)].stations.empty())
         fail(p, "element", "has no station whose law could change");
-      }
       index(p, "law", a.law.index, m_.laws);
       finite_not_negative(p, "ramp", a.ramp);
       if (!(a.stiffness_share > 0 && a.stiffness_share <= 1000))

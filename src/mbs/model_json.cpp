@@ -283,6 +283,7 @@ class Reader {
   void place_joint(const Node& n, Joint& j) const;
   Quantity quantity_from(const Node& n) const;
   Trigger trigger_from(const Node& n) const;
+  void element_of(const Node& n, Action& a) const;
   Action action_from(const Node& n) const;
 
   Joint joint_from(const Node& n) const;
@@ -600,10 +601,14 @@ void Reader::read_contact(const Node& n, Contact& c) const {
 
 /// The one key that names an item, and the word for what is asked of it.
 Quantity Reader::quantity_from(const Node& n) const {
-  const std::pair<const char*, const Names*> items[] = {
-      {"body", &bodies_},      {"joint", &joints_},   {"element", &elements_},
-      {"bushing", &bushings_}, {"spring", &springs_}, {"rotational_spring", &rotational_springs_},
-      {"cable", &cables_}};
+  const std::pair<const char*, const Names*> items[] = {{"body", &bodies_},
+                                                        {"joint", &joints_},
+                                                        {"element", &elements_},
+                                                        {"rotational", &rotational_elements_},
+                                                        {"bushing", &bushings_},
+                                                        {"spring", &springs_},
+                                                        {"rotational_spring", &rotational_springs_},
+                                                        {"cable", &cables_}};
   const char* item = nullptr;
   Quantity q;
   for (const auto& [key, names] : items) {
@@ -612,7 +617,7 @@ Quantity Reader::quantity_from(const Node& n) const {
     item = key;
     q.index = names == &bodies_ ? body(n[key], false).index : refer(n[key], *names);
   }
-  if (!item) n.fail("needs a body, joint, element, bushing, spring, rotational_spring or cable");
+  if (!item) n.fail("needs a body, joint, element, rotational (element), bushing, spring, rotational_spring or cable");
   std::vector<std::string> words;
   std::vector<Quantity::Kind> kinds;
   for (int k = 0; k < kQuantityKinds; ++k) {
@@ -650,6 +655,15 @@ Output Reader::output_from(const Node& n) const {
   return o;
 }
 
+/// A zone element, or a rotational one.
+void Reader::element_of(const Node& n, Action& a) const {
+  if (has_first(n, "element", "rotational")) {
+    a.element = {refer(n["element"], elements_)};
+  } else {
+    a.rotational = refer(n["rotational"], rotational_elements_);
+  }
+}
+
 Action Reader::action_from(const Node& n) const {
   using Kind = Action::Kind;
   Action a;
@@ -663,16 +677,12 @@ Action Reader::action_from(const Node& n) const {
   };
   switch (a.kind) {
     case Kind::RemoveElement:
-      only({"element"});
-      a.element = {refer(n["element"], elements_)};
+      only({"element", "rotational"});
+      element_of(n, a);
       break;
     case Kind::SwitchLaw:
       only({"element", "rotational", "law", "ramp", "stiffness_share"});
-      if (has_first(n, "element", "rotational")) {
-        a.element = {refer(n["element"], elements_)};
-      } else {
-        a.rotational = refer(n["rotational"], rotational_elements_);
-      }
+      element_of(n, a);
       a.law = {refer(n["law"], laws_)};
       read(n, "ramp", a.ramp);
       read(n, "stiffness_share", a.stiffness_share);

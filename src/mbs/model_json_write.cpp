@@ -254,18 +254,22 @@ Json json_of(const Output& o) {
   return j;
 }
 
+void put_element(Json& j, const Action& a) {
+  if (a.rotational >= 0) {
+    j["rotational"] = a.rotational;
+  } else {
+    j["element"] = a.element.index;
+  }
+}
+
 Json json_of(const Action& a) {
   Json j{{"do", kActionWords[static_cast<size_t>(a.kind)]}};
   switch (a.kind) {
     case Action::Kind::RemoveElement:
-      j["element"] = a.element.index;
+      put_element(j, a);
       break;
     case Action::Kind::SwitchLaw:
-      if (a.rotational >= 0) {
-        j["rotational"] = a.rotational;
-      } else {
-        j["element"] = a.element.index;
-      }
+      put_element(j, a);
       j["law"] = a.law.index;
       j["ramp"] = a.ramp;
       j["stiffness_share"] = a.stiffness_share;

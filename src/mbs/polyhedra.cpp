@@ -155,14 +155,20 @@ void hull_hull(const Solid& a, const Solid& b, int& remembered, BoxContact& out)
   };
   if (remembered >= 0 && static_cast<size_t>(remembered) < axes && is_apart(look(static_cast<size_t>(remembered))))
     return;
-  Axis best{{}, std::numeric_limits<double>::infinity(), -1}, least = best;
+  const Axis none{{}, std::numeric_limits<double>::infinity(), -1};
+  Axis least_of[3] = {none, none, none};  // faces of a, of b, pairs of edges
   for (size_t i = 0; i < axes; ++i) {
     const Axis axis = look(i);
     if (is_apart(axis)) return;
-    // faces are preferred to edges, and those of the first, unless clearly deeper: the choice stays steady
-    const double preference = i < faces_a ? 1.0 : i < faces_a + faces_b ? 0.98 : 0.95;
-    if (axis.overlap < preference * best.overlap - (i < faces_a ? 0 : 1e-9)) best = axis;
+    Axis& least = least_of[i < faces_a ? 0 : i < faces_a + faces_b ? 1 : 2];
     if (axis.overlap < least.overlap) least = axis;
+  }
+  // faces are preferred to edges, and those of the first, unless clearly deeper: the choice stays steady
+  Axis best = least_of[0], least = best;
+  for (const int i : {1, 2}) {
+    const Axis& other = least_of[i];
+    if (other.overlap < (i == 1 ? 0.98 : 0.95) * best.overlap - 1e-9) best = other;
+    if (other.overlap < least.overlap) least = other;
   }
   if (best.number < 0) return;
   out.normal = best.n;

@@ -43,6 +43,12 @@ double calc_scalar(const Quantity& q, const View& v) {
       return scalar_at(v.torsion_angle, q.index);
     case Kind::TorsionTorque:
       return scalar_at(v.torsion_torque, q.index);
+    case Kind::HingeRotation:
+      return scalar_at(v.hinge_rotation, q.index);
+    case Kind::HingeMoment:
+      return scalar_at(v.hinge_moment, q.index);
+    case Kind::CableLength:
+      return scalar_at(v.cable_length, q.index);
     case Kind::CableForce:
       return scalar_at(v.cable_force, q.index);
     default:
@@ -102,6 +108,8 @@ const QuantityTraits& traits_of(Kind kind) {
       {"element", "rotation", 3, "rad", "F"},
       {"element", "force", 3, "N", "F"},
       {"element", "moment", 3, "N m", "F"},
+      {"rotational", "rotation", 1, "rad", ""},
+      {"rotational", "moment", 1, "N m", ""},
       {"bushing", "translation", 3, "m", "F"},
       {"bushing", "rotation", 3, "rad", "F"},
       {"bushing", "force", 3, "N", "F"},
@@ -110,6 +118,7 @@ const QuantityTraits& traits_of(Kind kind) {
       {"spring", "force", 1, "N", ""},
       {"rotational_spring", "angle", 1, "rad", ""},
       {"rotational_spring", "torque", 1, "N m", ""},
+      {"cable", "length", 1, "m", ""},
       {"cable", "force", 1, "N", ""},
   };
   static_assert(std::size(kTraits) == kQuantityKinds);

@@ -11,7 +11,7 @@ namespace topple::mbs {
 
 /// How a kind of quantity is called, and what its numbers are.
 struct QuantityTraits {
-  const char* item;   // whose it is: "body", "joint", "element", "bushing", "spring", "rotational_spring", "cable"
+  const char* item;   // whose it is: "body", "joint", "element", "rotational", "bushing", ...
   const char* word;   // "position", "force", ...; unique for an item
   int components;     // of an output: 1, 3, or 4 of a quaternion w x y z
   const char* unit;   // "m", "N m"; "1" of a quaternion

@@ -51,9 +51,11 @@ struct View {
   std::vector<double> joint_displacement;           // of prismatic and cylindrical joints, else 0 [m]
   std::vector<bool> joint_released;
   std::vector<Vec3> element_translation, element_rotation;  // deformation in its axes; zone elements only [m, rad]
-  std::vector<double> cable_force;
-  std::vector<double> spring_length, spring_force;    // [m, N]
-  std::vector<double> torsion_angle, torsion_torque;  // of rotational springs [rad, N·m]
+  // of rotational elements, whatever has taken over from their joints; the normal force is that of their limits
+  std::vector<double> hinge_rotation, hinge_moment, hinge_normal;  // [rad, N·m about Fz on the child, N pull positive]
+  std::vector<double> cable_length, cable_force;                   // [m, N]
+  std::vector<double> spring_length, spring_force;                 // [m, N]
+  std::vector<double> torsion_angle, torsion_torque;               // of rotational springs [rad, N·m]
   std::vector<Vec3> bushing_translation, bushing_rotation, bushing_force, bushing_moment;  // force of a on b, in F
   Vec3 ground_force;          // of the ground on everything: contact, elements, joints and cables tied to it [N]
   Vec3 contact_force_ground;  // the part by contact [N]

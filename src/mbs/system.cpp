@@ -399,6 +399,12 @@ void System::evaluate_rotational(size_t i, double h) {
   if (!z.live) break_element(E + i, z.reason);
 }
 
+double System::calc_hinge_rotation(size_t i) const {
+  if (was_loosened(i)) return measure_zone(elements[E + i]).deformation.c[5];
+  const JointState& j = state.joint[static_cast<size_t>(rotationals[i].joint)];
+  return j.live ? j.angle : state.rotational[i].deformation[5];
+}
+
 void System::evaluate_cables(bool at_rest) {
   for (size_t i = 0; i < model.cables.size(); ++i) {
     CableState& c = state.cable[i];
@@ -471,7 +477,12 @@ void System::act(const DueEvent& due) {
   for (const Action& a : model.events[static_cast<size_t>(due.index)].actions) {
     switch (a.kind) {
       case Action::Kind::RemoveElement: {
-        const size_t e = static_cast<size_t>(a.element.index);
+        const size_t r = static_cast<size_t>(a.rotational);
+        if (a.rotational >= 0 && !was_loosened(r)) {
+          remove_rotational(r, find_ending(time));
+          break;
+        }
+        const size_t e = a.rotational >= 0 ? E + r : static_cast<size_t>(a.element.index);
         ZoneState& z = state.element[e];
         if (!z.live) break;
         unpack_element(e);
@@ -943,11 +954,16 @@ void System::see() {
     v.element_translation[i] = {d[0], d[1], d[2]};
     v.element_rotation[i] = {d[3], d[4], d[5]};
   }
+  v.hinge_rotation.resize(R);
+  v.hinge_moment.resize(R);
+  v.hinge_normal.resize(R);
   for (size_t i = 0; i < R; ++i) {
-    if (was_loosened(i))
-      fill(E + i, elements[E + i].zone, s.element[E + i]);
-    else
-      fill(E + i, rotationals[i].zone, s.rotational[i]);
+    const bool is_element = was_loosened(i);
+    const ZoneState& z = is_element ? s.element[E + i] : s.rotational[i];
+    fill(E + i, is_element ? elements[E + i].zone : rotationals[i].zone, z);
+    v.hinge_rotation[i] = calc_hinge_rotation(i);
+    v.hinge_moment[i] = -z.resultant.c[5];
+    v.hinge_normal[i] = !z.live ? 0 : is_element ? z.resultant.c[0] : z.normal_force;
   }
   v.joint_force.resize(joints.size());
   v.joint_moment.resize(joints.size());
@@ -975,7 +991,12 @@ void System::see() {
     if (c.child < 0 || fixed[static_cast<size_t>(c.child)]) joints_on_ground -= reaction_force[j];
   }
   v.cable_force.resize(s.cable.size());
-  for (size_t i = 0; i < s.cable.size(); ++i) v.cable_force[i] = s.cable[i].force;
+  v.cable_length.resize(s.cable.size());
+  for (size_t i = 0; i < s.cable.size(); ++i) {
+    const Cable& k = model.cables[i];
+    v.cable_force[i] = s.cable[i].force;
+    v.cable_length[i] = norm(calc_point(k.b.index, k.p_B) - calc_point(k.a.index, k.p_A));
+  }
   view_forces(v);
   v.contact_force_ground = ground_contact;
   for (size_t b = 0; b < B; ++b) v.contact_force_ground += GroundBox(s.ground_box[b]).push;

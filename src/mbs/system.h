@@ -480,6 +480,9 @@ class System {
   void pack_body(size_t body);
   void evaluate_rotationals(double h);
   void evaluate_rotational(size_t rotational, double h);
+  /// Rotation of a rotational element's joint, or of what has taken over from it; of one that is gone as it was [rad].
+  double calc_hinge_rotation(size_t rotational) const;
+  void remove_rotational(size_t rotational, const Ending& ending);
   /// Whether a rotational element has taken over from its joint and still holds.
   bool is_loose(size_t rotational) const { return state.element[E + rotational].live; }
   /// The same whether it still holds or not.

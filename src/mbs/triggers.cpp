@@ -24,6 +24,7 @@ bool is_force(Quantity::Kind kind) {
     case JointMoment:
     case ElementForce:
     case ElementMoment:
+    case HingeMoment:
     case BushingForce:
     case BushingMoment:
     case SpringForce:
@@ -87,6 +88,11 @@ double System::calc_component(const Quantity& q, int component) {
       const double* f = s.element[i].resultant.c + (q.kind == Quantity::Kind::ElementForce ? 0 : 3);
       return component_of(-Vec3{f[0], f[1], f[2]}, component);
     }
+    case Quantity::Kind::HingeRotation:
+      return component_of(calc_hinge_rotation(i), component);
+    case Quantity::Kind::HingeMoment:
+      if (is_loose(i)) unpack_element(E + i);
+      return component_of(-(was_loosened(i) ? s.element[E + i] : s.rotational[i]).resultant.c[5], component);
     case Quantity::Kind::BushingTranslation:
       return component_of(measure_bushing(i).u, component);
     case Quantity::Kind::BushingRotation:
@@ -109,6 +115,10 @@ double System::calc_component(const Quantity& q, int component) {
     }
     case Quantity::Kind::TorsionTorque:
       return component_of(s.torsion[i].component.spring + s.torsion[i].component.damper, component);
+    case Quantity::Kind::CableLength: {
+      const Cable& k = model.cables[i];
+      return component_of(norm(calc_point(k.b.index, k.p_B) - calc_point(k.a.index, k.p_A)), component);
+    }
     case Quantity::Kind::CableForce:
       return component_of(s.cable[i].force, component);
   }

@@ -1054,8 +1054,8 @@ struct Evaluation {
       StationState& st = z.station[s];
       const CompiledLaw& law = limits[s].law();
       const bool was_far = st.reached >= law.rupture_rotation;
-      if (turned[s]) {
-        flowed = true;
+      if (turned[s]) flowed = true;
+      if (turned[s] || (!p.is_at_rest && is_damaged(st))) {
         st.reached = std::max(st.reached, length_of(phi, m, s));
         st.strained = std::max(st.strained, strain_of(phi, m, s, limits[s].rotation_ratio()));
       }

@@ -30,6 +30,9 @@ struct StationState {
   int k[2] = {0, 0}, j[2] = {0, 0};  // lookup hints
 };
 
+/// Whether damage has left flexibility behind, on which the rotation grows without flow.
+inline bool is_damaged(const StationState& s) { return s.soft[0] > s.crack[0] || s.soft[1] > s.crack[1]; }
+
 /// Inelastic history of a six-component zone, its last resultants and its ledger.
 struct ZoneState {
   bool live = true;

@@ -16,6 +16,7 @@ constexpr double kMostLimit = 1e300;  // finite, for the kernel
 /// between.
 ///   k, j  where to look first
 double find_least_moment(const CompiledFamily& family, double from, double to, double rotation, int k, int j) {
+  if (family.K == 0) return kUnlimited;
   double least = kUnlimited;
   const auto look = [&](double force) {
     const MomentLimit limit = calc_moment_limit(family, force, rotation, k, j);
@@ -79,6 +80,35 @@ bool find_springs(const ZoneParameters& p, ZoneState& z) {
   return true;
 }
 
+/// The same between two rotations.
+double find_least_moment(const CompiledFamily& family, double from, double to, const double rotation[2],
+                         const StationState& st, int q) {
+  double least = kUnlimited;
+  const auto look = [&](double at) {
+    least = std::min(least, find_least_moment(family, from, to, at, st.k[q], st.j[q]));
+  };
+  look(rotation[0]);
+  if (!(rotation[1] > rotation[0])) return least;
+  look(rotation[1]);
+  for (auto r = std::upper_bound(family.rotation.begin(), family.rotation.end(), rotation[0]);
+       r != family.rotation.end() && *r < rotation[1]; ++r)
+    look(*r);
+  return least;
+}
+
+/// How far a damaged station may turn on its flexibility while its moments are no more than these, and the same as its
+/// edges feel it [rad].
+void find_elastic_turn(const ZoneParameters& p, const StationState& st, double ratio, const double moment[2],
+                       double& reached, double& strained) {
+  double turned = 0, felt = 0;
+  for (int q = kernel::first_bending(p.plane); q <= kernel::last_bending(p.plane); ++q) {
+    const double soft = st.soft[q] - st.crack[q];
+    const double turn = std::abs(st.phi[q] - st.bow[q]) + (soft > 0 ? soft * moment[q] : 0);
+    turned += turn * turn, felt += (q == 0 ? 1 : ratio * ratio) * turn * turn;
+  }
+  reached = std::max(st.reached, std::sqrt(turned)), strained = std::max(st.strained, std::sqrt(felt));
+}
+
 void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const Limits& limits, double normal_force,
                       ZoneState& z) {
   const auto law_of = [&](int s) -> const CompiledLaw& {
@@ -100,12 +130,26 @@ void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const L
     if (z.station[s].reached >= law_of(s).rupture_rotation) to = std::min(to, -kTiny);  // held by what presses it
   z.safe_force[0] = 1, z.safe_force[1] = -1;
   if (whole != 1 || !(from <= to)) return;
+  for (int q = first; q <= last; ++q) z.safe_moment[q] = kUnlimited;
+  StationState furthest = most_strained(z);
+  for (int s = 0; s < p.stations; ++s) {
+    const CompiledLaw& law = law_of(s);
+    const StationState& st = z.station[s];
+    double rotation[2] = {st.strained, st.strained}, reached = st.reached, moment[2] = {0, 0};
+    if (is_damaged(st)) {
+      for (int q = first; q <= last; ++q)
+        moment[q] = find_least_moment(law.moment[q], from, to, st.strained, st.k[q], st.j[q]);
+      find_elastic_turn(p, st, law.rotation_ratio, moment, reached, rotation[1]);
+      if (reached >= (st.reached >= law.rupture_rotation ? law.rupture_rotation_pressed : law.rupture_rotation)) return;
+      furthest.strained = std::max(furthest.strained, rotation[1]);
+    }
+    for (int q = first; q <= last; ++q)
+      z.safe_moment[q] = std::min(z.safe_moment[q], find_least_moment(law.moment[q], from, to, rotation, st, q));
+  }
+  if (!p.external_axial && furthest.strained > most_strained(z).strained)
+    from = std::max(from, -limits.compression(furthest, z.shortened, whole));
+  if (!(from <= to)) return;
   for (int q = first; q <= last; ++q) {
-    z.safe_moment[q] = kUnlimited;
-    for (int s = 0; s < p.stations; ++s)
-      z.safe_moment[q] =
-          std::min(z.safe_moment[q], find_least_moment(law_of(s).moment[q], from, to, z.station[s].strained,
-                                                       z.station[s].k[q], z.station[s].j[q]));
     z.safe_shear[1 - q] = limits.shear(1 - q, z.slipped, -to);
     if (!(z.safe_moment[q] > 0 && z.safe_shear[1 - q] > 0 && limits.torsion() > 0)) return;
   }

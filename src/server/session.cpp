@@ -342,7 +342,8 @@ void Session::publish_zones() {
       const auto [piece, row] = b.find_frame(f);
       const collapse::LiveRun& run = *piece->run;
       const record::Record& r = run.record();
-      const std::size_t Z = r.zones.size(), E = run.model().model().elements.size();
+      const std::size_t Z = r.zones.size(),
+                        E = run.model().model().elements.size() + run.model().model().rotational_elements.size();
       if (zone >= Z) continue;
       Json point{r.time[row]};
       for (std::size_t i = 0; i < collapse::kZonePath; ++i)

@@ -384,7 +384,8 @@ TEST_F(StudyFaults, LeaveAFinishedStudyWhereItsRepetitionIsInterrupted) {
   EXPECT_EQ(run({TOPPLE_PROGRAM, "study", "export", folder / "other", "-o", folder / "out"}), 2);
   EXPECT_NE(read(folder / "log").find("holds another study, whose files these would replace"), std::string::npos);
   expect_same("out", "before");
-  EXPECT_EQ(run({TOPPLE_PROGRAM, "study", "export", folder / "other", "-o", folder / "tables"}), 0);
+  EXPECT_EQ(run({TOPPLE_PROGRAM, "study", "export", folder / "other", "-o", folder / "tables", "--json"}), 0);
+  EXPECT_NE(read(folder / "log").find(read(folder / "tables/results.json")), std::string::npos);
 }
 
 TEST_F(StudyFaults, DoNotMixBuilds) {

@@ -1,6 +1,8 @@
 // Joints that go over to their rotational elements. g = 9.81.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "mbs/batch.h"
 #include "mbs/system.h"
 #include "models.h"
@@ -90,6 +92,79 @@ TEST(LoosenJointPhysics, WhatIsCrushedThroughComesApart) {
   EXPECT_EQ(told, std::vector<std::string>{"element 0 crushing"});
   EXPECT_TRUE(released);
   EXPECT_LT(sum.energy_error, 1e-3);
+}
+
+/// A bar that turns about its hinge against a rotational element, without gravity: sin ωt.
+Model make_turning_bar(double rate, double stiffness, double& frequency) {
+  Model m;
+  m.gravity = {};
+  m.contact.ground = m.contact.bodies = false;
+  Body bar = make_box("bar", 12, {0.5, 0.1, 0.1}, {0.5, 0, 0});
+  bar.v_WB = {0, 0.5 * rate, 0}, bar.w_WB = {0, 0, rate};
+  frequency = std::sqrt(stiffness / (bar.inertia(2, 2) + 12 * 0.25));
+  add_body(m, bar);
+  Joint j;
+  j.kind = Joint::Kind::Revolute;
+  j.child = {0};
+  j.X_CM.p = {-0.5, 0, 0};
+  RotationalElement r;
+  r.joint = add_joint(m, j);
+  r.stiffness = stiffness;
+  r.damping_ratio = 0;
+  r.loose_translational = {1e6, 1e6, 1e6};
+  r.loose_torsion = r.loose_bending = 1e4;
+  m.rotational_elements.push_back(r);
+  return m;
+}
+
+TEST(RotationalElementPhysics, TellsItsRotationAndMomentBeforeAndAfterItsJointIsLoosened) {
+  constexpr double rate = 0.4, stiffness = 200;
+  double w = 0;
+  Model m = make_turning_bar(rate, stiffness, w);
+  m.events.push_back(make_event(0.1, Action::Kind::LoosenJoint, 0, "loosen"));
+  Options o = options_of(0.3, 2e-4);
+  double off = 0, pull = 0;
+  o.on_frame = [&](const View& v) {
+    const double angle = rate / w * std::sin(w * v.time);
+    off = std::max(
+        {off, std::abs(v.hinge_rotation[0] - angle) * stiffness, std::abs(v.hinge_moment[0] + stiffness * angle)});
+    if (v.time > 0.01) pull = std::max(pull, std::abs(v.hinge_normal[0] + v.joint_force[0].x));
+  };
+  (void)run(m, o);
+  EXPECT_LT(off, 0.01 * stiffness * rate / w);
+  EXPECT_LT(pull, 0.01);  // of 1 N: 12 kg at 0.5 m
+}
+
+TEST(RotationalElementPhysics, RemovedItLetsItsJointTurnFreely) {
+  constexpr double rate = 0.4, stiffness = 200, taken = 0.1003;
+  double w = 0;
+  const Model still = make_turning_bar(rate, stiffness, w);
+  double before = 0;
+  for (const double step : {1e-3, 5e-4}) {
+    Model m = still;
+    Action a;
+    a.kind = Action::Kind::RemoveElement;
+    a.rotational = 0;
+    Event e;
+    e.time = taken;
+    e.actions = {a};
+    m.events = {e};
+    Options o = options_of(0.3, step);
+    View last;
+    o.on_frame = [&](const View& v) { last = v; };
+    const Summary sum = run(m, o);
+    const double wrong = std::abs(last.w_WB[0].z - rate * std::cos(w * taken));
+    if (before > 0) { EXPECT_LT(wrong, 0.3 * before); }  // second order
+    before = wrong;
+    EXPECT_LT(wrong, 1e-5);
+    EXPECT_EQ(last.hinge_moment[0], 0);
+    EXPECT_EQ(last.element_state[0], ElementState::Removed);
+    EXPECT_FALSE(last.joint_released[0]);
+    const double angle = rate / w * std::sin(w * taken);
+    EXPECT_NEAR(last.hinge_rotation[0], angle + (last.time - taken) * rate * std::cos(w * taken), 1e-5);
+    EXPECT_NEAR(last.energy.removed, 0.5 * stiffness * angle * angle, 1e-4);
+    EXPECT_LT(sum.energy_error, 1e-4);
+  }
 }
 
 TEST(LoosenJointPhysics, GoesOnBearingWhatTheJointDid) {

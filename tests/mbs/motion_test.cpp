@@ -291,6 +291,14 @@ TEST(FreeBody, TorqueFreeTopTurnsAsInTheReference) {
   EXPECT_NEAR(std::log10(off[0] / off[1]), 2, 0.1);  // second order: a tenth of the step, a hundredth of the error
 }
 
+TEST(FreeBody, TorqueFreeTopComesBackAfterItsPeriod) {
+  Options o = options_of(22.996262944, 2e-4);
+  Vec3 w;
+  o.on_frame = [&](const View& v) { w = transpose_times(to_matrix(v.X_WB[0].q), v.w_WB[0]); };
+  EXPECT_NEAR(run(make_top({0.1, 1, 0.1}), o).time, 22.996262944, 2e-4);
+  EXPECT_LT(norm(w - Vec3{0.1, 1, 0.1}), 2e-5);  // the last step ends up to 2e-4 s beside it, at 0.06 rad/s²
+}
+
 TEST(FreeBody, TurnsOverTwelveTimesAsInTheReference) {
   // I = (1, 2, 3), nearly about the middle axis: the times of its turns over (computed independently) and its energy,
   // free and held at its mass centre

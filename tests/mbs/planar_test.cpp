@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -333,6 +334,16 @@ TEST(Planar, GoesThroughItsFile) {
   EXPECT_EQ(to_json(m, {}).find("is_planar"), std::string::npos) << "files of others stay as they were";
   m.is_planar = true;
   EXPECT_TRUE(model_from_json(to_json(m, {}), "model", nullptr).is_planar);
+}
+
+TEST(Planar, RefusesAGroundThatRisesAcross) {
+  Model m;
+  add_body(m, make_box("b", 1, {1, 1, 1}, {0, 0, 2}));
+  m.is_planar = true;
+  m.contact.normal = {std::sin(0.3), 0, std::cos(0.3)};
+  EXPECT_NO_THROW(check_model(m));
+  m.contact.normal = {0, std::sin(0.3), std::cos(0.3)};
+  EXPECT_THROW(check_model(m), InputError);
 }
 
 }  // namespace

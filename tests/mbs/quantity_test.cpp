@@ -26,7 +26,7 @@ View make_view() {
           &v.element_moment, &v.bushing_translation, &v.bushing_rotation, &v.bushing_force, &v.bushing_moment})
       list->push_back(vector());
     for (auto* list : {&v.joint_angle, &v.joint_displacement, &v.spring_length, &v.spring_force, &v.torsion_angle,
-                       &v.torsion_torque, &v.cable_force})
+                       &v.torsion_torque, &v.hinge_rotation, &v.hinge_moment, &v.cable_length, &v.cable_force})
       list->push_back(number());
   }
   return v;

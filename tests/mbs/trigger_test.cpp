@@ -43,6 +43,12 @@ Model make_model() {
   r.joint = add_joint(m, j);
   r.spring.rate = 3;
   m.rotational_springs.push_back(r);
+  RotationalElement knee;
+  knee.name = "knee";
+  knee.joint = r.joint;
+  knee.stiffness = 0.2;
+  knee.damping_ratio = 0;
+  m.rotational_elements.push_back(knee);
   SpringDamper s;
   s.name = "stay";
   s.a = kGround;
@@ -129,24 +135,22 @@ TEST_P(TriggerOf, FiresAtTheFirstStepBeyondTheLimit) {
   EXPECT_LT(fired, passed + c.late * h + 1e-9);
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryQuantity, TriggerOf,
-                         ::testing::Values(Case{Quantity::Kind::Position, 0, 2, -0.5, false, 0},
-                                           Case{Quantity::Kind::Orientation, 0, 1, 0.5, true, 0},
-                                           Case{Quantity::Kind::Velocity, 0, 3, 2, true, 0},
-                                           Case{Quantity::Kind::AngularVelocity, 0, 1, 2, true, 0},
-                                           Case{Quantity::Kind::JointForce, 0, 3, 25, true, 1},
-                                           Case{Quantity::Kind::JointAngle, 0, 0, 0.6, true, 0},
-                                           Case{Quantity::Kind::ElementTranslation, 0, 2, -0.05, false, 0},
-                                           Case{Quantity::Kind::ElementForce, 0, 2, 4, true, 1},
-                                           Case{Quantity::Kind::BushingTranslation, 0, 3, 0.06, true, 0},
-                                           Case{Quantity::Kind::BushingRotation, 0, 1, 1e-3, true, 0},
-                                           Case{Quantity::Kind::BushingForce, 0, 2, 30, true, 1},
-                                           Case{Quantity::Kind::BushingMoment, 0, 1, -0.4, false, 1},
-                                           Case{Quantity::Kind::SpringLength, 0, 0, 1.5, true, 0},
-                                           Case{Quantity::Kind::SpringForce, 0, 0, 1.5, true, 1},
-                                           Case{Quantity::Kind::TorsionAngle, 0, 0, 0.7, true, 0},
-                                           Case{Quantity::Kind::TorsionTorque, 0, 0, 2, true, 1},
-                                           Case{Quantity::Kind::CableForce, 0, 0, 4, true, 1}));
+INSTANTIATE_TEST_SUITE_P(
+    EveryQuantity, TriggerOf,
+    ::testing::Values(
+        Case{Quantity::Kind::Position, 0, 2, -0.5, false, 0}, Case{Quantity::Kind::Orientation, 0, 1, 0.5, true, 0},
+        Case{Quantity::Kind::Velocity, 0, 3, 2, true, 0}, Case{Quantity::Kind::AngularVelocity, 0, 1, 2, true, 0},
+        Case{Quantity::Kind::JointForce, 0, 3, 25, true, 1}, Case{Quantity::Kind::JointAngle, 0, 0, 0.6, true, 0},
+        Case{Quantity::Kind::ElementTranslation, 0, 2, -0.05, false, 0},
+        Case{Quantity::Kind::ElementForce, 0, 2, 4, true, 1}, Case{Quantity::Kind::HingeRotation, 0, 0, 0.6, true, 0},
+        Case{Quantity::Kind::HingeMoment, 0, 0, -0.1, false, 1},
+        Case{Quantity::Kind::BushingTranslation, 0, 3, 0.06, true, 0},
+        Case{Quantity::Kind::BushingRotation, 0, 1, 1e-3, true, 0},
+        Case{Quantity::Kind::BushingForce, 0, 2, 30, true, 1},
+        Case{Quantity::Kind::BushingMoment, 0, 1, -0.4, false, 1},
+        Case{Quantity::Kind::SpringLength, 0, 0, 1.5, true, 0}, Case{Quantity::Kind::SpringForce, 0, 0, 1.5, true, 1},
+        Case{Quantity::Kind::TorsionAngle, 0, 0, 0.7, true, 0}, Case{Quantity::Kind::TorsionTorque, 0, 0, 2, true, 1},
+        Case{Quantity::Kind::CableLength, 0, 0, 2.03, true, 0}, Case{Quantity::Kind::CableForce, 0, 0, 4, true, 1}));
 
 Event make_event(const std::string& name, double time, std::vector<Trigger> triggers, Action::Kind kind, int index) {
   Event e;

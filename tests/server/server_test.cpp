@@ -494,8 +494,24 @@ TEST_F(ServerTest, TellsAZonesPath) {
     ASSERT_TRUE(e.is_object());
     EXPECT_EQ(e["zone"], zone);
     for (const TestJson& p : e["points"]) EXPECT_EQ(p.size(), 8U);
+    // under dead load the column is pressed, and its moment has the sign of its rotation
+    if (const TestJson& p = e["points"][0]; points == 0) {
+      EXPECT_EQ(p[0], 0);
+      EXPECT_LT(p[1], 0);
+      EXPECT_GT(p[3].get<double>() * p[5].get<double>(), 0);
+    }
     points += e["points"].size();
   }
+  // its top is a hinge, and bears as much
+  std::string top = zone;
+  top.replace(top.rfind('/'), std::string::npos, "/top");
+  c->result("zone", {{"zone", top}});
+  const TestJson e = c->wait_for_type("zone");
+  ASSERT_EQ(e["zone"], top);
+  const TestJson& p = e["points"][0];
+  EXPECT_LT(p[1], 0);
+  EXPECT_TRUE(p[2].is_null() && p[4].is_null()) << p;
+  EXPECT_TRUE(p[3].is_number() && p[5].is_number()) << p;
   EXPECT_EQ(c->code("zone", {{"zone", "none"}}), "E920");
 }
 

@@ -52,7 +52,9 @@ function makeCurves(law: LawFamily | undefined, path: (number | null)[][], which
 export function ZonePlot(props: { s: SteerState; zone: ZoneWatch }) {
   const { s, zone } = props;
   const holder = useRef<HTMLDivElement>(null);
-  const [which, setWhich] = useState<Axis>("y");
+  const [chosen, setWhich] = useState<Axis>("y");
+  const isHinge = zone.path.length > 0 && zone.path.every((p) => p[2] === null);  // it turns about its z alone
+  const which = isHinge ? "z" : chosen;
   const [table, setTable] = useState(false);
   const law = zone.law === null ? undefined : which === "y" ? zone.law.moment_y : zone.law.moment_z;
   const latest = useRef(zone.path);
@@ -151,7 +153,7 @@ export function ZonePlot(props: { s: SteerState; zone: ZoneWatch }) {
       <div class="inspector-head">
         <h3>{zone.zone}</h3>
         <span class="small-group" role="group" aria-label="Axis of bending">
-          {(["y", "z"] as const).map((a) => <button type="button" class="small" aria-pressed={which === a} onClick={() => setWhich(a)}>M{a}</button>)}
+          {(isHinge ? ["z"] as const : ["y", "z"] as const).map((a) => <button type="button" class="small" aria-pressed={which === a} onClick={() => setWhich(a)}>M{a}</button>)}
           <button type="button" class="small" aria-label="Stop watching this zone" onClick={() => void s.watchZone(null)}>×</button>
         </span>
       </div>
