@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "base/error.h"
@@ -28,9 +29,11 @@ void check_options(const DesignOptions& o) {
   demand(o.confidence > 0 && o.confidence < 1, "confidence lies between 0 and 1");
 }
 
-/// At most this part of a box violates whose fresh points have all passed.
+/// At most this part of a box violates whose fresh points have all passed: shares of 1 - confidence for every try that
+/// could come, 6/(π T)² for the T-th, add up to all of it.
 double bound_violating(const PermissibleBox& b, double confidence) {
-  return 1 - std::pow((1 - confidence) / b.tries, 1.0 / b.fresh);
+  const double share = 6 / std::pow(std::numbers::pi * b.tries, 2);
+  return 1 - std::pow((1 - confidence) * share, 1.0 / b.fresh);
 }
 
 std::vector<FuzzyNumber> make_inputs(const Box& box, const Point& core) {
@@ -104,8 +107,10 @@ class Design {
       const int share = asker_.rest() / static_cast<int>(centres.size() - g);
       // growing may take more than there is; what it has learnt then serves a choice
       const int end = asker_.asked() + share;
-      if (share < wanted || !grow(static_cast<int>(g), centres[g], 7 * share / 10))
-        choose(static_cast<int>(g), centres[g], std::max(0, end - asker_.asked()));
+      int tries = g < options_.tried.size() ? options_.tried[g] : 0;
+      const bool grows = share >= wanted;
+      if (!grows || !grow(static_cast<int>(g), centres[g], 7 * share / 10, tries))
+        choose(static_cast<int>(g), centres[g], std::max(0, end - asker_.asked()), tries, grows);
     }
     for (PermissibleBox& b : boxes_) result_.boxes.push_back(std::move(b));
     review_boxes(space_, result_.boxes, requirement_, asker_.archive(), options_);
@@ -230,8 +235,15 @@ class Design {
     return verdicts;
   }
 
+  /// Of a group's points, others where it is searched again.
+  std::uint64_t seed_of(int g, bool again) const {
+    const std::uint64_t searches = (options_.tried.empty() ? 0 : 2) + (again ? 1 : 0);
+    return options_.seed + 104729 * static_cast<std::uint64_t>(g + 1) + 15485863 * searches;
+  }
+
   /// True if the box is kept, or that of another group.
-  bool grow(int g, int centre, int share) {
+  ///   tries  of this group so far
+  bool grow(int g, int centre, int share, int& tries) {
     const int limit = asker_.limit();
     asker_.set_limit(std::min(limit, asker_.asked() + share));
     PermissibleBox b;
@@ -240,7 +252,7 @@ class Design {
     BoxGrowth growth(
         support_, middle, [this](const std::vector<Point>& points) { return judge(points); },
         [this](const Point& x) { return is_possible(x); },
-        {options_.edge, smallest_, options_.rounds, options_.seed + 104729 * static_cast<std::uint64_t>(g + 1)});
+        {options_.edge, smallest_, options_.rounds, seed_of(g, false)});
     for (int seen = 0; !b.kept;) {
       for (; seen < asker_.asked(); ++seen)
         if (is_violating(seen)) growth.add_violating(asker_.archive()[seen].x);
@@ -248,7 +260,7 @@ class Design {
       b.box = growth.box();
       b.volume = growth.calc_part();
       if (!grown) break;
-      ++b.tries;
+      b.tries = ++tries;
       const auto fresh = growth.make_random_points(options_.fresh);
       if (!growth.check(fresh)) {
         if (!asker_.can_go_on()) break;
@@ -271,14 +283,16 @@ class Design {
 
   /// With few runs: the largest box that keeps out what is known to violate, tried at its corners and at fresh points;
   /// what violates there is kept out of the next one, by a distance that grows as runs are spent.
-  void choose(int g, int centre, int share) {
+  ///   again  after one that was grown in vain
+  void choose(int g, int centre, int share, int tries, bool again) {
     PermissibleBox b, broken;  // broken: passed at its fresh points, and a later run violates
     b.group = g, b.centre = centre;
     const Point middle = asker_.archive()[centre].x;
     b.box = {middle, middle};
     const int limit = asker_.limit(), end = asker_.asked() + share;
     asker_.set_limit(std::min(limit, end));
-    Random random(options_.seed + 104729 * static_cast<std::uint64_t>(g + 1));
+    b.tries = tries;
+    Random random(seed_of(g, again));
     Front front(middle);
     constexpr double coarse = 0.05, widest = 0.15;  // of the support's widths
     BoxGrowth corners(

@@ -31,6 +31,7 @@ struct DesignOptions {
                              // runs that are there and its trials alone; 0: 100 times the square of the inputs' number
   std::vector<double> levels = {0, 0.25, 0.5, 0.75, 1};
   std::uint64_t seed = 1;
+  std::vector<int> tried;  // tries of an earlier search on these runs, by group; their fresh points are not drawn again
 };
 
 /// Part of the support's volume below which boxes with as many sides as this one are not kept.
@@ -48,7 +49,7 @@ struct PermissibleBox {
   int fresh = 0;                    // independent random points that passed, last time
   std::vector<Point> fresh_points;  // those
   int tries = 0;                    // how often so many were tried, violations before the last included
-  double violating = 1;   // with the confidence, at most this part of the box violates: 1 - (β/tries)^(1/fresh)
+  double violating = 1;   // with the confidence, at most this part of the box violates: 1 - (6 β/(π tries)²)^(1/fresh)
   double distance = 0;    // least requirement inside over its range in all runs; 0 without a range
   double robustness = 0;  // entropies of the inputs over that of the ranking output
   std::vector<OutputBounds> outputs;  // of the fuzzy analysis on these inputs

@@ -121,11 +121,13 @@ Point place_in(const Box& box, const Point& fractions) {
 }
 
 std::vector<Point> make_corners(const Box& box) {
-  const std::size_t n = box.lower.size();
-  std::vector<Point> corners(std::size_t{1} << n, box.lower);
+  std::vector<std::size_t> axes;
+  for (std::size_t i = 0; i < box.lower.size(); ++i)
+    if (box.lower[i] < box.upper[i]) axes.push_back(i);
+  std::vector<Point> corners(std::size_t{1} << axes.size(), box.lower);
   for (std::size_t k = 0; k < corners.size(); ++k)
-    for (std::size_t i = 0; i < n; ++i)
-      if (k >> i & 1) corners[k][i] = box.upper[i];
+    for (std::size_t i = 0; i < axes.size(); ++i)
+      if (k >> i & 1) corners[k][axes[i]] = box.upper[axes[i]];
   return corners;
 }
 

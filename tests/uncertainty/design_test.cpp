@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "base/error.h"
 #include "reference_cases.h"
@@ -60,7 +61,7 @@ TEST(DesignPhysics, SaysLittleButTrueThingsFromFewRuns) {
       ++kept;
       EXPECT_LE(b.fresh, 20);
       EXPECT_GE(b.fresh, 10) << "half of them, where later runs made it smaller";
-      EXPECT_NEAR(b.violating, 1 - std::pow(0.05 / b.tries, 1.0 / b.fresh), 1e-12);
+      EXPECT_NEAR(b.violating, 1 - std::pow(0.05 * 6 / std::pow(std::numbers::pi * b.tries, 2), 1.0 / b.fresh), 1e-12);
       Random random(99);
       int bad = 0;
       for (int k = 0; k < 20000; ++k) {
@@ -154,6 +155,53 @@ TEST(DesignPhysics, FacesThatShrankForOthersMoveBackOut) {
   }
 }
 
+TEST(Design, DrawsNoFreshPointTwiceWhereItSearchesAgain) {
+  const auto is_good = [](const Point& x) { return x[0] + x[1] + x[2] + x[3] < 2.3; };
+  const Space space{std::vector<FuzzyNumber>(4, make_triangular(0, 0.4, 1)), {}, {}};
+  DesignOptions options;
+  options.space_points = 100;
+  options.fresh = 20;
+  options.rerun_limit = 0;
+  options.k_max = 2;
+  const Progress progress;
+  Asker asker(make_model(is_good), progress, nullptr, 900);
+  asker.set_limit(300);
+  const DesignResult first = find_permissible_boxes(space, asker, outcome_0, options);
+  asker.set_limit(900);
+  for (const auto& b : first.boxes) {
+    options.tried.resize(std::max(options.tried.size(), static_cast<size_t>(b.group) + 1));
+    options.tried[static_cast<size_t>(b.group)] = b.tries;
+  }
+  ASSERT_FALSE(options.tried.empty());
+  const DesignResult second = find_permissible_boxes(space, asker, outcome_0, options);
+  // where in its box a fresh point lies
+  const auto places = [](const DesignResult& r) {
+    std::vector<double> all;
+    for (const auto& b : r.boxes)
+      for (const Point& x : b.fresh_points)
+        for (size_t i = 0; i < 4; ++i) all.push_back((x[i] - b.box.lower[i]) / (b.box.upper[i] - b.box.lower[i]));
+    return all;
+  };
+  const std::vector<double> before = places(first), now = places(second);
+  ASSERT_FALSE(before.empty());
+  ASSERT_FALSE(now.empty());
+  for (const double x : now)
+    EXPECT_TRUE(std::ranges::none_of(before, [&](double y) { return std::abs(x - y) < 1e-12; })) << x;
+  for (const auto& b : second.boxes)
+    if (b.fresh > 0) { EXPECT_GT(b.tries, options.tried[static_cast<size_t>(b.group)]); }
+}
+
+TEST(Space, CornersAreThoseOfItsWideInputs) {
+  Box box{Point(40, 1), Point(40, 1)};
+  box.upper[3] = 2, box.upper[31] = 5;
+  const std::vector<Point> corners = make_corners(box);
+  ASSERT_EQ(corners.size(), 4u);
+  EXPECT_EQ(corners[1][3], 2);
+  EXPECT_EQ(corners[1][31], 1);
+  EXPECT_EQ(corners[2][31], 5);
+  EXPECT_EQ(corners[3][0], 1);
+}
+
 TEST(Design, KeepsNoBoxWithoutRunsForIt) {
   DesignOptions options;
   options.space_points = 60;
@@ -189,7 +237,7 @@ TEST(DesignReference, BoxesOfTheJump) {
         EXPECT_EQ(b.inputs[0].support().left, b.box.lower[0]);
         EXPECT_EQ(b.inputs[1].centre(), f.archive[b.centre].x[1]);
         EXPECT_EQ(b.fresh, 149);
-        EXPECT_NEAR(b.violating, 1 - std::pow(0.05 / b.tries, 1.0 / 149), 1e-12);
+        EXPECT_NEAR(b.violating, 1 - std::pow(0.05 * 6 / std::pow(std::numbers::pi * b.tries, 2), 1.0 / 149), 1e-12);
         if (calc_volume(b.box) > largest) largest = calc_volume(b.box), corner = b.box.lower;
       }
       EXPECT_LE(largest, 1200.224726);
