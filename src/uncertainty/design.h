@@ -49,9 +49,9 @@ struct PermissibleBox {
   int fresh = 0;                    // independent random points that passed, last time
   std::vector<Point> fresh_points;  // those
   int tries = 0;                    // how often so many were tried, violations before the last included
-  double violating = 1;   // with the confidence, at most this part of the box violates: 1 - (6 β/(π tries)²)^(1/fresh)
-  double distance = 0;    // least requirement inside over its range in all runs; 0 without a range
-  double robustness = 0;  // entropies of the inputs over that of the ranking output
+  double violating = 1;  // with the confidence, at most this part of the box violates: 1 - (6 β/(π tries)²)^(1/fresh)
+  double distance = 0;   // least requirement inside over its range in all runs; 0 without a range
+  double robustness = 0;              // entropies of the inputs over that of the ranking output
   std::vector<OutputBounds> outputs;  // of the fuzzy analysis on these inputs
   bool kept = false;                  // verified, large enough, and no violation in the fuzzy analysis
 };

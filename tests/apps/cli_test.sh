@@ -454,7 +454,7 @@ mbs)
   expect 0 "$topple" mbs run "$pendulum" -o d --no-report --json --duration 0.1
   is_json out; has out '"joint_drift"'; has out '"samples": 11'; has out '"file": "d/outputs/lower_position.csv"'
   # options go before the file
-  expect 1 "$topple" mbs run "$pendulum" -o e --no-report --equilibrium; has out "no equilibrium"; has out "--no-equilibrium"
+  expect 1 "$topple" mbs run "$pendulum" -o e --no-report --equilibrium; has out "No equilibrium"; has out "--no-equilibrium"
   has e/outputs/lower_position.csv "time [s]"
   expect 2 "$topple" mbs run "$pendulum" -o e --equilibrium --no-equilibrium
   expect 0 "$topple" mbs run "$pendulum" -o f --no-report --step "1 ms" --duration 0.5s; has out "0.5 s in 500 steps of 1 ms"

@@ -39,6 +39,11 @@ Evaluate make_model(std::function<bool(const Point&)> is_good) {
   });
 }
 
+/// With 95 %, shares of the rest for each try that could have come.
+double bound_of(const PermissibleBox& b) {
+  return 1 - std::pow(0.05 * 6 / std::pow(std::numbers::pi * b.tries, 2), 1.0 / b.fresh);
+}
+
 const Requirement outcome_0 = [](const Result& r) { return r.outcome == 0 ? 1.0 : -1.0; };
 
 // The sum of four inputs between 0 and 1 stays below 2.3. With 300 runs a box must come with fewer trials than
@@ -61,7 +66,7 @@ TEST(DesignPhysics, SaysLittleButTrueThingsFromFewRuns) {
       ++kept;
       EXPECT_LE(b.fresh, 20);
       EXPECT_GE(b.fresh, 10) << "half of them, where later runs made it smaller";
-      EXPECT_NEAR(b.violating, 1 - std::pow(0.05 * 6 / std::pow(std::numbers::pi * b.tries, 2), 1.0 / b.fresh), 1e-12);
+      EXPECT_NEAR(b.violating, bound_of(b), 1e-12);
       Random random(99);
       int bad = 0;
       for (int k = 0; k < 20000; ++k) {
@@ -126,7 +131,7 @@ TEST(Design, BoxesShrinkWhenLaterRunsViolate) {
   EXPECT_GT(b.volume, 0.8 * before.volume);
   EXPECT_LT(b.fresh, before.fresh);
   EXPECT_EQ(static_cast<int>(b.fresh_points.size()), b.fresh);
-  EXPECT_NEAR(b.violating, 1 - std::pow(0.05 / b.tries, 1.0 / b.fresh), 1e-12);
+  EXPECT_NEAR(b.violating, bound_of(b), 1e-12);
   EXPECT_EQ(b.inputs[0].support().right, b.box.upper[0]);
   EXPECT_EQ(b.inputs[1].support().right, b.box.upper[1]);
   ASSERT_EQ(b.outputs.size(), before.outputs.size());
@@ -237,7 +242,7 @@ TEST(DesignReference, BoxesOfTheJump) {
         EXPECT_EQ(b.inputs[0].support().left, b.box.lower[0]);
         EXPECT_EQ(b.inputs[1].centre(), f.archive[b.centre].x[1]);
         EXPECT_EQ(b.fresh, 149);
-        EXPECT_NEAR(b.violating, 1 - std::pow(0.05 * 6 / std::pow(std::numbers::pi * b.tries, 2), 1.0 / 149), 1e-12);
+        EXPECT_NEAR(b.violating, bound_of(b), 1e-12);
         if (calc_volume(b.box) > largest) largest = calc_volume(b.box), corner = b.box.lower;
       }
       EXPECT_LE(largest, 1200.224726);
