@@ -52,9 +52,11 @@ function makeCurves(law: LawFamily | undefined, path: (number | null)[][], which
 export function ZonePlot(props: { s: SteerState; zone: ZoneWatch }) {
   const { s, zone } = props;
   const holder = useRef<HTMLDivElement>(null);
-  const [chosen, setWhich] = useState<Axis>("y");
+  const [chosen, setWhich] = useState<{ zone: string; axis: Axis } | null>(null);
   const isHinge = zone.path.length > 0 && zone.path.every((p) => p[2] === null);  // it turns about its z alone
-  const which = isHinge ? "z" : chosen;
+  const largest = (column: number) => zone.path.reduce((most, p) => Math.max(most, Math.abs(p[column] ?? 0)), 0);
+  const own = chosen !== null && chosen.zone === zone.zone ? chosen.axis : null;
+  const which: Axis = isHinge ? "z" : own ?? (largest(3) > largest(2) ? "z" : "y");
   const [table, setTable] = useState(false);
   const law = zone.law === null ? undefined : which === "y" ? zone.law.moment_y : zone.law.moment_z;
   const latest = useRef(zone.path);
@@ -153,7 +155,7 @@ export function ZonePlot(props: { s: SteerState; zone: ZoneWatch }) {
       <div class="inspector-head">
         <h3>{zone.zone}</h3>
         <span class="small-group" role="group" aria-label="Axis of bending">
-          {(isHinge ? ["z"] as const : ["y", "z"] as const).map((a) => <button type="button" class="small" aria-pressed={which === a} onClick={() => setWhich(a)}>M{a}</button>)}
+          {(isHinge ? ["z"] as const : ["y", "z"] as const).map((a) => <button type="button" class="small" aria-pressed={which === a} onClick={() => setWhich({ zone: zone.zone, axis: a })}>M{a}</button>)}
           <button type="button" class="small" aria-label="Stop watching this zone" onClick={() => void s.watchZone(null)}>×</button>
         </span>
       </div>
