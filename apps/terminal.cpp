@@ -166,10 +166,10 @@ void EventPrinter::print(const record::Event& e) {
 }
 
 std::string tell_counts(const record::Counts& c, double standing_mass) {
-  std::string text =
-      fmt::format("Model: {} rigid bodies, {} revolute joints, {} rigid joints, {} force elements{}; {:.0f} t",
-                  c.bodies, c.revolute_joints, c.rigid_joints, c.force_elements,
-                  c.cables > 0 ? fmt::format(", {} cables", c.cables) : "", standing_mass / unit::t);
+  std::string text = fmt::format(
+      "Model: {} rigid bodies, {} revolute joints, {} rigid joints, {} force elements{}; {:.0f} t", c.bodies,
+      c.revolute_joints, c.rigid_joints, c.force_elements,
+      c.cables > 0 ? fmt::format(", {} cable{}", c.cables, c.cables == 1 ? "" : "s") : "", standing_mass / unit::t);
   // what stays: stumps below charges
   const long all = std::lround(standing_mass / unit::t), moving = std::lround(c.mass / unit::t);
   if (moving != all) text += fmt::format(", {} t of it in motion ({} t of stumps stay)", moving, all - moving);

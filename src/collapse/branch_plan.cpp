@@ -87,9 +87,12 @@ bool added_and_let_go(const LiveModel& live, const std::string& name) {
 
 }  // namespace
 
-BranchPlan write_branch_plan(const LiveModel& live) {
+BranchPlan write_branch_plan(const LiveModel& live, const std::string& sample) {
   BranchPlan out;
   out.text = live.plan().text;
+  if (!sample.empty())
+    out.left_out.push_back("values of the sample (" + sample +
+                           "): the text has those of the plan, but for charges where an edit of charges is in it");
   struct Change {
     std::string words;
     product::PlanChanges changes;

@@ -18,6 +18,7 @@ struct BranchPlan {
 /// the very beginning: a plan knows no later moment for them. A charge that was taken out fails. An edit with which the
 /// text would be no plan is left out, with the first error as the reason; edits of charges are taken or left out
 /// together. Firing times scatter anew.
-BranchPlan write_branch_plan(const LiveModel&);
+///   sample  of a study that the branch plays, in words: the text has the plan's own values instead
+BranchPlan write_branch_plan(const LiveModel&, const std::string& sample = {});
 
 }  // namespace topple::collapse

@@ -773,9 +773,9 @@ void add_rigid_block(const Context& c) {
         tons, row.size(), moment, way);
   };
   const std::string model_words = words();
-  const std::string hinge_words = row.size() == 1
-                                      ? "Its hinge does not give before it yields, unlike a zone of the model."
-                                      : "Its hinges do not give before they yield, unlike zones of the model.";
+  std::string hinge_words = row.size() == 1 ? "Its hinge does not give before it yields, unlike a zone of the model."
+                                            : "Its hinges do not give before they yield, unlike zones of the model.";
+  if (!c.model.cables.empty()) hinge_words += " Cables are not counted in that.";
   // a block that has already left its place is not released from rest
   bool rests = true;
   for (const BlockFrame& f : c.recorder.block_frames())

@@ -26,14 +26,16 @@ namespace {
 std::string item_of(const mbs::Model& m, const mbs::Quantity& q) {
   const std::string item = mbs::traits_of(q.kind).item;
   const size_t i = static_cast<size_t>(q.index);
-  const std::string& name = item == "body"      ? m.bodies[i].name
-                            : item == "joint"   ? m.joints[i].name
-                            : item == "element" ? m.elements[i].name
-                            : item == "bushing" ? m.bushings[i].name
-                            : item == "spring"  ? m.springs[i].name
-                            : item == "cable"   ? m.cables[i].name
-                                                : m.rotational_springs[i].name;
-  return fmt::format("{} {}", item, name.empty() ? fmt::format("number {}", i) : name);
+  const std::string& name = item == "body"         ? m.bodies[i].name
+                            : item == "joint"      ? m.joints[i].name
+                            : item == "element"    ? m.elements[i].name
+                            : item == "rotational" ? m.rotational_elements[i].name
+                            : item == "bushing"    ? m.bushings[i].name
+                            : item == "spring"     ? m.springs[i].name
+                            : item == "cable"      ? m.cables[i].name
+                                                   : m.rotational_springs[i].name;
+  return fmt::format("{} {}", item == "rotational" ? "rotational element" : item,
+                     name.empty() ? fmt::format("number {}", i) : name);
 }
 
 /// One table in the record for each output, and who fills it while the model runs.

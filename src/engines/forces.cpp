@@ -587,9 +587,12 @@ const mbs::Six* Forces::find_loose(size_t j) const {
 
 void Forces::release_joint(size_t j, double time) {
   is_cached_ = false;
-  for (size_t i = 0; i < rotational_.size(); ++i)
-    if (model_.rotational_elements[i].joint.index == static_cast<int>(j) && rotational_[i].state.live)
-      mbs::break_zone(rotational_[i].state, mbs::BreakReason::Removed);
+  for (size_t i = 0; i < rotational_.size(); ++i) {
+    if (model_.rotational_elements[i].joint.index != static_cast<int>(j)) continue;
+    Zone& z = rotational_[i];
+    if (!z.is_loose) z.is_released = true;
+    if (z.state.live) mbs::break_zone(z.state, mbs::BreakReason::Removed);
+  }
   end_torsions(j, time);
 }
 
@@ -709,8 +712,9 @@ void Forces::fill(double time, const Motion& motion, mbs::View& v) const {
   for (size_t i = 0; i < R; ++i) {
     const Zone& z = rotational_[i];
     fill_zone(E + i, time, z, v);
-    v.hinge_rotation[i] = z.is_loose && z.state.live ? z.state.deformation[5]
-                                                     : angle_of(motion, model_.rotational_elements[i].joint, z.angle);
+    v.hinge_rotation[i] = z.is_released || (z.is_loose && z.state.live)
+                              ? z.state.deformation[5]
+                              : angle_of(motion, model_.rotational_elements[i].joint, z.angle);
     v.hinge_moment[i] = -z.state.resultant.c[5];
     v.hinge_normal[i] = !z.state.live ? 0 : z.is_loose ? z.state.resultant.c[0] : z.axial_force;
   }

@@ -104,9 +104,10 @@ class Forces {
   struct Zone {
     mbs::ZoneParameters parameters;
     mbs::ZoneState state;
-    double angle = 0;        // of a rotational element's joint, accepted [rad]
-    double axial_force = 0;  // of a rotational element's joint, accepted; tension positive [N]
-    bool is_loose = false;   // a rotational element that has taken over from its joint
+    double angle = 0;          // of a rotational element's joint, accepted [rad]
+    double axial_force = 0;    // of a rotational element's joint, accepted; tension positive [N]
+    bool is_loose = false;     // a rotational element that has taken over from its joint
+    bool is_released = false;  // one whose joint is gone
   };
   struct Spring {
     bool live = true;

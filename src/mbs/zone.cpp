@@ -54,7 +54,8 @@ void soften(const ZoneParameters& p, ZoneState& z) {
   z.twist -= flexed(3);
   if (p.stations > 0) {
     for (int q = 0; q < 2; ++q) {
-      for (int s = 0; s < p.stations; ++s) z.station[s].phi[q] -= flexed(4 + q) / p.stations;
+      for (int s = 0; s < p.stations; ++s)  // it turns no station
+        for (double* x : {&z.station[s].phi[q], &z.station[s].bow[q]}) *x -= flexed(4 + q) / p.stations;
       double lever = 0;
       for (int s = 0; s < p.stations; ++s) lever += p.x[s] / p.stations;
       (q == 0 ? z.slip[1] : z.slip[0]) += (q == 0 ? 1 : -1) * lever * flexed(4 + q);
@@ -133,12 +134,11 @@ void crack_zone(const ZoneParameters& p, ZoneState& z) {
       for (int side = 0; side < 2; ++side) st.crest[q][side] = p.cracking[q].end[side];
       const CrackLine line = make_crack_line(p.cracking[q], st.crest[q]);
       const double grown = line.flexibility - st.crack[q];
-      st.bow[q] = line.bow;
       if (grown == 0) continue;
       const double lever = (q == 0 ? 1 : -1) * p.x[s], m = z.elastic_force[4 + q] + lever * z.elastic_force[2 - q];
       st.crack[q] += grown;
       st.soft[q] += grown;
-      st.phi[q] -= grown * m;
+      st.phi[q] -= grown * m, st.bow[q] -= grown * m;  // it turns no station
       const double stored = 0.5 * grown * m * m;
       z.energy += stored;
       z.plastic -= stored;
@@ -163,6 +163,7 @@ void free_zone(const ZoneParameters& p, const Six& carried, ZoneState& z) {
     if (i == 5 || !(k > 0)) continue;
     const double give = 1 / k + (i == 4 ? z.station[0].soft[0] : 0), stored = 0.5 * f * f * give;
     *unstrained[i] -= f * give;
+    if (i == 4) z.station[0].bow[0] -= f * give;
     z.offset[i] = -f * give;
     z.elastic[i] = z.flowed[i] = f / k;
     z.elastic_force[i] = z.resultant.c[i] = f;
@@ -668,7 +669,6 @@ struct Evaluation {
 
   /// One station after the other, each anew as the other one is.
   ///   still  share of a rotation by which none moves any more
-  ///   turn_anew  turns a station, which has not turned in this step
   template <class Turn>
   void take_turns(int most_sweeps, double still, const Turn& turn_anew) {
     for (int sweep = 0; sweep < most_sweeps; ++sweep) {
@@ -757,7 +757,7 @@ struct Evaluation {
       }
     }
     if (!outside[0] || !outside[1] || turn_both(scale)) return;
-    take_turns(12, 1e-11, [&](int s) {
+    take_turns(200, 1e-11, [&](int s) {
       if (is_outside(limits[s], s, scale[s])) (void)turn(s, scale[s]);
     });
   }
@@ -1056,8 +1056,9 @@ struct Evaluation {
       const bool was_far = st.reached >= law.rupture_rotation;
       if (turned[s]) flowed = true;
       if (turned[s] || (!p.is_at_rest && is_damaged(st))) {
-        st.reached = std::max(st.reached, length_of(phi, m, s));
-        st.strained = std::max(st.strained, strain_of(phi, m, s, limits[s].rotation_ratio()));
+        const double length = length_of(phi, m, s), strain = strain_of(phi, m, s, limits[s].rotation_ratio());
+        if (length > st.reached || strain > st.strained) z.safe_force[0] = 1, z.safe_force[1] = -1;
+        st.reached = std::max(st.reached, length), st.strained = std::max(st.strained, strain);
       }
       if (st.reached >= (force[0] < 0 || was_far ? law.rupture_rotation_pressed : law.rupture_rotation))
         broke = BreakReason::Rotation;

@@ -80,33 +80,21 @@ bool find_springs(const ZoneParameters& p, ZoneState& z) {
   return true;
 }
 
-/// The same between two rotations.
-double find_least_moment(const CompiledFamily& family, double from, double to, const double rotation[2],
-                         const StationState& st, int q) {
-  double least = kUnlimited;
-  const auto look = [&](double at) {
-    least = std::min(least, find_least_moment(family, from, to, at, st.k[q], st.j[q]));
-  };
-  look(rotation[0]);
-  if (!(rotation[1] > rotation[0])) return least;
-  look(rotation[1]);
-  for (auto r = std::upper_bound(family.rotation.begin(), family.rotation.end(), rotation[0]);
-       r != family.rotation.end() && *r < rotation[1]; ++r)
-    look(*r);
-  return least;
-}
-
-/// How far a damaged station may turn on its flexibility while its moments are no more than these, and the same as its
-/// edges feel it [rad].
-void find_elastic_turn(const ZoneParameters& p, const StationState& st, double ratio, const double moment[2],
-                       double& reached, double& strained) {
-  double turned = 0, felt = 0;
-  for (int q = kernel::first_bending(p.plane); q <= kernel::last_bending(p.plane); ++q) {
-    const double soft = st.soft[q] - st.crack[q];
-    const double turn = std::abs(st.phi[q] - st.bow[q]) + (soft > 0 ? soft * moment[q] : 0);
-    turned += turn * turn, felt += (q == 0 ? 1 : ratio * ratio) * turn * turn;
+/// Share of moments up to which a damaged station turns no further on its flexibility than it has.
+double find_share_within(const ZoneParameters& p, const StationState& st, double rotation_ratio,
+                         const double moment[2]) {
+  double share = 1;
+  for (const bool felt : {false, true}) {  // by itself and as its edges feel it
+    const double most = felt ? st.strained : st.reached;
+    double a = 0, b = 0, c = -most * most;  // a x² + 2 b x + c = 0
+    for (int q = kernel::first_bending(p.plane); q <= kernel::last_bending(p.plane); ++q) {
+      const double w = felt && q == 1 ? rotation_ratio : 1, soft = st.soft[q] - st.crack[q];
+      const double at = w * std::abs(st.phi[q] - st.bow[q]), by = soft > 0 ? w * soft * moment[q] : 0;
+      a += by * by, b += at * by, c += at * at;
+    }
+    if (a + 2 * b + c > 0) share = std::min(share, c < 0 && std::isfinite(a) ? -c / (b + std::sqrt(b * b - a * c)) : 0);
   }
-  reached = std::max(st.reached, std::sqrt(turned)), strained = std::max(st.strained, std::sqrt(felt));
+  return share;
 }
 
 void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const Limits& limits, double normal_force,
@@ -131,24 +119,15 @@ void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const L
   z.safe_force[0] = 1, z.safe_force[1] = -1;
   if (whole != 1 || !(from <= to)) return;
   for (int q = first; q <= last; ++q) z.safe_moment[q] = kUnlimited;
-  StationState furthest = most_strained(z);
   for (int s = 0; s < p.stations; ++s) {
     const CompiledLaw& law = law_of(s);
     const StationState& st = z.station[s];
-    double rotation[2] = {st.strained, st.strained}, reached = st.reached, moment[2] = {0, 0};
-    if (is_damaged(st)) {
-      for (int q = first; q <= last; ++q)
-        moment[q] = find_least_moment(law.moment[q], from, to, st.strained, st.k[q], st.j[q]);
-      find_elastic_turn(p, st, law.rotation_ratio, moment, reached, rotation[1]);
-      if (reached >= (st.reached >= law.rupture_rotation ? law.rupture_rotation_pressed : law.rupture_rotation)) return;
-      furthest.strained = std::max(furthest.strained, rotation[1]);
-    }
+    double least[2] = {0, 0};
     for (int q = first; q <= last; ++q)
-      z.safe_moment[q] = std::min(z.safe_moment[q], find_least_moment(law.moment[q], from, to, rotation, st, q));
+      least[q] = find_least_moment(law.moment[q], from, to, st.strained, st.k[q], st.j[q]);
+    const double share = is_damaged(st) ? find_share_within(p, st, law.rotation_ratio, least) : 1;
+    for (int q = first; q <= last; ++q) z.safe_moment[q] = std::min(z.safe_moment[q], share > 0 ? share * least[q] : 0);
   }
-  if (!p.external_axial && furthest.strained > most_strained(z).strained)
-    from = std::max(from, -limits.compression(furthest, z.shortened, whole));
-  if (!(from <= to)) return;
   for (int q = first; q <= last; ++q) {
     z.safe_shear[1 - q] = limits.shear(1 - q, z.slipped, -to);
     if (!(z.safe_moment[q] > 0 && z.safe_shear[1 - q] > 0 && limits.torsion() > 0)) return;

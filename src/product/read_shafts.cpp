@@ -198,6 +198,7 @@ void read_shafts(Reading& reading, TableReader& root) {
     return;
   }
   for (size_t i = 0; i < nodes.size(); ++i) {
+    const int errors_before = reading.complaints.error_count();
     TableReader table(*nodes[i], "shafts[" + std::to_string(i) + "]", reading.complaints);
     Member m;
     Shaft s;
@@ -234,6 +235,9 @@ void read_shafts(Reading& reading, TableReader& root) {
     s.joint_spacing = std::isnan(spacing) ? 0 : spacing;
     table.finish();
     if (table.is_table()) check_shape(table, s);
+    // of a place that is not known nothing is said beside others
+    if (reading.complaints.error_count() != errors_before)
+      m.start.x = m.start.y = m.end.x = m.end.y = std::numeric_limits<double>::quiet_NaN();
     m.shaft = static_cast<int>(reading.plan.shafts.size());
     reading.shaft_places.push_back(table.place_of("position"));
     reading.plan.shafts.push_back(std::move(s));

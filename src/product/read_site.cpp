@@ -154,7 +154,7 @@ void check_neighbours(Reading& reading) {
     buildings.push_back({{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}});
   }
   for (const Member& m : plan.members) {
-    if (m.shaft < 0) continue;
+    if (m.shaft < 0 || !std::isfinite(m.start.x)) continue;
     const double radius = plan.shafts[static_cast<size_t>(m.shaft)].diameter_foot / 2;
     std::vector<Point>& ring = buildings.emplace_back();
     constexpr int corners = 48;

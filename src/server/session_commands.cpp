@@ -130,9 +130,10 @@ std::optional<Json> Session::perform(const Task& task) {
   if (word == "plan.text") {
     check_keys(command, {"edits"});
     if (!steering_) return Json{{"text", plan_.text}, {"sha256", calc_sha256(plan_.text)}, {"path", plan_.path}};
-    const collapse::LiveModel& live = branch_of(command).run().model();
+    const Branch& branch = branch_of(command);
+    const collapse::LiveModel& live = branch.run().model();
     collapse::BranchPlan plan{live.plan().text, {}, {}};
-    if (read_flag(command, "edits", false)) plan = collapse::write_branch_plan(live);
+    if (read_flag(command, "edits", false)) plan = collapse::write_branch_plan(live, branch.sample);
     return Json{{"text", plan.text},
                 {"sha256", calc_sha256(plan.text)},
                 {"path", plan_.path},

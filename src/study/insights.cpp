@@ -217,12 +217,8 @@ void find_boxes(Insights& out, const Problem& p, const Budget& b, uncertainty::A
   o.levels = levels;
   o.ranking_output = find_ranking_output(permissible, outputs);
   o.seed = p.seed;
-  if (out.has_boxes) o.tried.resize(static_cast<std::size_t>(o.k_max));
-  for (const uncertainty::PermissibleBox& one : out.boxes.boxes) {
-    const auto group = static_cast<std::size_t>(one.group);
-    o.tried.resize(std::max(o.tried.size(), group + 1));
-    o.tried[group] = std::max(o.tried[group], one.tries);
-  }
+  if (out.has_boxes) o.tried = 0;
+  for (const uncertainty::PermissibleBox& one : out.boxes.boxes) o.tried = std::max(o.tried, one.tries);
   out.boxes = uncertainty::find_permissible_boxes(p.space, asker, requirement, o);
   out.has_boxes = true;
 }

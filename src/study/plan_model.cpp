@@ -150,9 +150,10 @@ void list_debris_limits(const product::Plan& plan, const PlanMappingOptions& opt
   }
 }
 
-/// The planned direction of fall, with the rules' tolerance [rad] where the plan has none; that the building stands
-/// between stages is the outcome "early".
+/// The planned direction of fall, with the rules' tolerance [rad] where the plan has none. That the building stands
+/// between stages is the outcome "early", that it shall not is for a run to judge.
 void list_direction_limit(const product::Plan& plan, const PlanMappingOptions& options, double usual, Problem& p) {
+  if (plan.criteria.stands_between_stages == false) p.not_judged.emplace_back("stands_between_stages");
   if (!plan.criteria.azimuth) return;
   const double most = plan.criteria.azimuth_tolerance.value_or(usual);
   if (has_clearances(options))
@@ -277,7 +278,7 @@ void make_random(Problem& p, const product::Plan& plan) {
   // what is told of single runs
   p.curves.clear();
   p.site = {};
-  p.horizon.reset();
+  if (p.horizon) p.horizon->output.clear();  // a point's touchdowns are those of its inner runs
   p.asked.clear();
   for (const Limit& l : p.limits) p.not_judged.push_back(l.output);
   p.limits.clear();

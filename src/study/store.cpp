@@ -339,12 +339,12 @@ bool Store::begin_study(const StudyRow& s, const std::optional<StudyRow>& there)
           return !db_->run(insert, values).empty();
         },
         true);
-  values.insert(values.end(), {there->model, there->definition});
+  values.insert(values.end(), {there->model, there->definition, there->state});
   return transact(
       [&](bool) {
         const char* update =
             "UPDATE study SET model = $2, definition = $3, state = $4, summary = $5 WHERE name = $1 AND model = $6 AND "
-            "definition = $7 RETURNING name";
+            "definition = $7 AND state = $8 RETURNING name";
         return !db_->run(update, values).empty();
       },
       true);

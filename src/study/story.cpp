@@ -186,6 +186,12 @@ bool may_change(const Problem& p, const StudyResult& r, const uncertainty::Sampl
 /// A sentence that says that all is well does not, where runs ended in the middle.
 void doubt(const Problem& p, const StudyResult& r, Sentence& s) {
   const int unfinished = count_unfinished(p, r);
+  if (s.status == Status::Good && p.random && p.horizon) {
+    s.text +=
+        fmt::format(" Whether something had touched down in each inner run is not told: p(touchdown >= {:.4g}) is.",
+                    p.horizon->after);
+    s.status = Status::Info;
+  }
   if (unfinished == 0 || s.status != Status::Good) return;
   s.text += fmt::format(" But {} of the runs ended before anything had touched down.", unfinished);
   s.status = Status::Warning;

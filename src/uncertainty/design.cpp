@@ -107,7 +107,7 @@ class Design {
       const int share = asker_.rest() / static_cast<int>(centres.size() - g);
       // growing may take more than there is; what it has learnt then serves a choice
       const int end = asker_.asked() + share;
-      int tries = g < options_.tried.size() ? options_.tried[g] : 0;
+      int tries = std::max(options_.tried, 0);
       const bool grows = share >= wanted;
       if (!grows || !grow(static_cast<int>(g), centres[g], 7 * share / 10, tries))
         choose(static_cast<int>(g), centres[g], std::max(0, end - asker_.asked()), tries, grows);
@@ -237,7 +237,7 @@ class Design {
 
   /// Of a group's points, others where it is searched again.
   std::uint64_t seed_of(int g, bool again) const {
-    const std::uint64_t searches = (options_.tried.empty() ? 0 : 2) + (again ? 1 : 0);
+    const std::uint64_t searches = (options_.tried < 0 ? 0 : 2) + (again ? 1 : 0);
     return options_.seed + 104729 * static_cast<std::uint64_t>(g + 1) + 15485863 * searches;
   }
 

@@ -31,7 +31,7 @@ struct DesignOptions {
                              // runs that are there and its trials alone; 0: 100 times the square of the inputs' number
   std::vector<double> levels = {0, 0.25, 0.5, 0.75, 1};
   std::uint64_t seed = 1;
-  std::vector<int> tried;  // tries of an earlier search on these runs, by group; their fresh points are not drawn again
+  int tried = -1;  // most tries for a box in an earlier search on these runs; its points are not drawn again. -1: none
 };
 
 /// Part of the support's volume below which boxes with as many sides as this one are not kept.

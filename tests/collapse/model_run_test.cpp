@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "collapse/run.h"
 #include "mbs/model_json.h"
+#include "mbs/quantity.h"
 
 namespace topple::collapse {
 namespace {
@@ -400,6 +401,26 @@ TEST(ModelRun, ShowsHullsAsTheirBoxesAndNoPlanes) {
   EXPECT_EQ(r.bodies[0].shapes[0].half, (Vec3{1, 2, 3}));
   EXPECT_LT(norm(r.bodies[0].shapes[0].X_BS.p - Vec3{1 - 2, 1, 3}), 1e-15);
   EXPECT_TRUE(r.bodies[1].shapes.empty());
+}
+
+TEST(ModelRun, WritesAnOutputOfEachKindUnderTheNameOfItsItem) {
+  const std::string path = std::string(TOPPLE_SOURCE_DIR) + "/tests/data/everything.mbs.json";
+  mbs::RunSettings settings;
+  RunOptions o;
+  o.duration = 0.02;
+  o.step = settings.step;
+  o.equilibrium = false;
+  const Example e = run(mbs::model_from_json(read_file(path), path, &settings), o);
+  ASSERT_EQ(e.record.outputs.size(), e.model.outputs.size());
+  for (size_t i = 0; i < e.model.outputs.size(); ++i) {
+    const record::Output& out = e.record.outputs[i];
+    EXPECT_FALSE(out.value.empty()) << out.name;
+    EXPECT_EQ(out.quantity.find(std::string(mbs::traits_of(e.model.outputs[i].quantity.kind).word) + " of "), 0u)
+        << out.quantity;
+  }
+  EXPECT_EQ(output_of(e, "knee m").quantity, "moment of rotational element knee");
+  EXPECT_EQ(output_of(e, "coil torque").quantity, "torque of rotational_spring coil");
+  EXPECT_EQ(output_of(e, "rope length").quantity, "length of cable rope");
 }
 
 }  // namespace

@@ -282,6 +282,47 @@ TEST(Zone, StandsNoHigherThanTheRotationOfItsDamageAllows) {
   }
 }
 
+TEST(Zone, OfDamageStandsWhereItStoodWhileItIsASpring) {
+  // random walks under forces that come and go, evaluated with and without safe bounds
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> even(-1, 1);
+  for (const double damage : {0.3, 0.8})
+    for (int walk = 0; walk < 10; ++walk) {
+      ZoneLaw law = make_law();
+      law.damage_share = damage;
+      Walk bounded(law), free(law);
+      for (int leg = 0; leg < 30; ++leg) {
+        const Six from = bounded.before, to = deform(0.005 * even(random) - 0.005, 0, 0.03 * even(random));
+        for (int i = 1; i <= 100; ++i) {
+          Six at = from;
+          for (int c : {0, 5}) at.c[c] += (to.c[c] - from.c[c]) * i / 100;
+          free.z.safe_force[0] = 1, free.z.safe_force[1] = -1;
+          bounded.go(at, 1), free.go(at, 1);
+          ASSERT_NEAR(bounded.z.resultant.c[5], free.z.resultant.c[5], 1e-9 * 200e3)
+              << damage << " " << walk << " " << leg;
+        }
+      }
+    }
+}
+
+TEST(Zone, ASofterStiffnessIsNoRotation) {
+  // what a softer spring stretches further under the moment that it bears turns no station
+  for (const double damage : {0.0, 0.3}) {
+    ZoneLaw law = make_law();
+    law.damage_share = damage;
+    law.rupture_rotation = law.rupture_rotation_pressed = 0.03;
+    Walk w(law);
+    w.go(deform(-0.005, 0, 0.006));
+    const double reached = w.z.station[0].reached;
+    ASSERT_GT(reached, 0.004);
+    begin_switch(w.p, w.laws, {0, 0, 0, 0.02}, w.z);
+    for (int i = 0; i < 5; ++i) w.go(w.before, 1);
+    w.go(deform(-0.005, 0, 0.0061));
+    EXPECT_TRUE(w.z.live) << damage;
+    EXPECT_NEAR(w.z.station[0].reached, reached, 2e-4) << damage;
+  }
+}
+
 TEST(Zone, WorkIsStoredOrDissipated) {
   for (const double share : {0.0, 0.4}) {
     ZoneLaw law = make_law();
@@ -654,6 +695,32 @@ TEST(Zone, ItDoesNotMatterWhichStationIsListedFirst) {
         turned = std::max(turned, std::min(one.z.station[s].reached, other.z.station[1 - s].reached));
     }
     EXPECT_GT(turned, 0.01);
+  }
+}
+
+TEST(Zone, ItDoesNotMatterWhichStationOfADeepOrSlenderMemberIsListedFirst) {
+  // stations that hardly feel themselves beside the other one: many turns
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> even(-1, 1);
+  for (const double deep : {0.05, 10.0}) {
+    ZoneLaw law = test::plastic_hinge(100e3);
+    law.moment_y = law.moment_z, law.damage_share = 0;
+    ZoneParameters member = test::make_member();
+    member.stiffness[1] *= deep, member.stiffness[2] *= deep;
+    Walk one(law, member), other(law, member);
+    std::swap(other.p.x[0], other.p.x[1]);
+    for (int leg = 0; leg < 20; ++leg) {
+      const Six from = one.before;
+      Six to;
+      for (int c : {1, 2, 4, 5}) to.c[c] = 0.02 * even(random);
+      for (int i = 1; i <= 200; ++i) {
+        Six at = from;
+        for (int c : {1, 2, 4, 5}) at.c[c] += (to.c[c] - from.c[c]) * i / 200;
+        one.go(at, 1), other.go(at, 1);
+        for (int c : {4, 5})
+          ASSERT_NEAR(one.z.resultant.c[c], other.z.resultant.c[c], 1e-6 * 100e3) << deep << " " << leg << " " << i;
+      }
+    }
   }
 }
 

@@ -325,9 +325,10 @@ TEST_P(Stores, BeginAStudyForOneOfThoseWhoSawNone) {
   EXPECT_TRUE(store.begin_study(first, std::nullopt));
   EXPECT_FALSE(other.begin_study(second, std::nullopt));
   EXPECT_EQ(store.find_study("s")->definition, first.definition);
-  // finished meanwhile it is still the same one
-  store.put_study({"s", "m", first.definition, "finished", "{}"});
-  EXPECT_TRUE(other.begin_study(second, first));
+  const StudyRow finished{"s", "m", first.definition, "finished", "{}"};
+  store.put_study(finished);
+  EXPECT_FALSE(other.begin_study(second, first)) << "it was finished meanwhile";
+  EXPECT_TRUE(other.begin_study(second, finished));
   EXPECT_EQ(store.find_study("s")->model, "n");
   EXPECT_EQ(store.find_study("s")->state, "open");
   EXPECT_FALSE(store.begin_study(first, first));

@@ -268,7 +268,7 @@ function StudyResults(props: { study: StudySummary }) {
       <table>
         <thead><tr><th scope="col">Outcome</th><th scope="col" class="number">Possibility</th><th scope="col" class="number">Necessity</th><th scope="col" class="number">Runs</th></tr></thead>
         <tbody>
-          {study.outcomes.map((o) => (
+          {study.outcomes.filter((o) => o.is_failure || o.name !== "").map((o) => (
             <tr><td>{o.is_failure ? "failed" : o.name}</td><td class="number">{atLeast(o.possibility, 3)}</td><td class="number">{atMost(o.necessity, 3)}</td><td class="number">{o.runs}</td></tr>
           ))}
         </tbody>

@@ -25,7 +25,7 @@ function EventGroups(props: { run: Run }) {
                 <th scope="row"><EventSign kind={group.kind} /> {wordsOfEvent(group.kind).word}</th>
                 <td class="number">{group.events.length > 1 && `${group.events.length} ×`}</td>
                 <td>
-                  {group.events.length === 1 ? first.text || first.subject : subjects.slice(0, mostSubjects).join(", ")}
+                  {group.events.length === 1 ? first.text || first.subject : <span data-name>{subjects.slice(0, mostSubjects).join(", ")}</span>}
                   {group.events.length > 1 && others > 0 && ` and ${others} more`}
                 </td>
               </tr>

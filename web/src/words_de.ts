@@ -370,7 +370,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["and smaller ones", "und kleinere"],
   ["removal of its elements", "Entfernen seiner Elemente"],
   // no equilibrium
-  ["body \"{}\" is not connected to the ground by any element, joint, spring, bushing or cable: there is no dead-load equilibrium", "Körper „{}“ ist durch kein Element, kein Gelenk, keine Feder, keine Buchse und kein Seil mit dem Boden verbunden: Unter Eigengewicht wurde kein Gleichgewicht gefunden"],
+  ["body \"{}\" is not connected to the ground by any element, joint, spring, bushing or cable: there is no dead-load equilibrium", "Körper „{}“ ist durch kein Element, kein Gelenk, keine Feder, keine Buchse und kein Seil mit dem Boden verbunden: Es gibt kein Gleichgewicht unter Eigengewicht"],
   ["the stiffness matrix of the dead-load equilibrium could not be factorised: the model is a mechanism", "die Steifigkeitsmatrix des Gleichgewichts ließ sich nicht zerlegen: Das Modell ist ein Mechanismus"],
   ["body \"{}\" can move without resistance: the model is a mechanism and has no dead-load equilibrium", "Körper „{}“ kann sich ohne Widerstand bewegen: Das Modell ist ein Mechanismus und hat kein Gleichgewicht unter Eigengewicht"],
   ["no dead-load equilibrium after {:d} iterations: the largest unbalanced force is {:.2g} times the weight, of body \"{}\"", "kein Gleichgewicht nach {} Iterationen: Die größte nicht ausgeglichene Kraft ist das {}-Fache des Gewichts, an Körper „{}“"],
