@@ -23,8 +23,7 @@ void append_length(std::string& to, double v) { append_bytes(to, std::round(1e6 
 std::string describe(const product::Plan& plan, size_t index) {
   const Member& m = plan.members[index];
   std::string key;
-  for (const int v : {static_cast<int>(m.kind), m.storey, m.row_a, m.row_b, m.section, m.panel, m.removed ? 1 : 0})
-    append_bytes(key, v);
+  for (const int v : {static_cast<int>(m.kind), m.storey, m.row_a, m.row_b, m.section, m.panel}) append_bytes(key, v);
   for (const double v : {m.start.x, m.end.x, m.start.z, m.end.z, m.height, m.end.y - m.start.y}) append_length(key, v);
   append_bytes(key, static_cast<double>(m.openings.size()));
   for (const product::Opening& o : m.openings)
@@ -49,6 +48,7 @@ std::vector<std::string> describe_frames(const product::Plan& plan) {
   std::vector<Parts> parts(plan.frame_names.size());
   for (size_t i = 0; i < plan.members.size(); ++i) {
     const Member& m = plan.members[i];
+    if (m.removed) continue;
     const size_t a = static_cast<size_t>(m.frame_a), b = static_cast<size_t>(m.frame_b);
     if (a == b) {
       parts[a].own.push_back(describe(plan, i));

@@ -51,6 +51,18 @@ TEST(Condense, FramesDifferByWhatIsInOneOfTheSamples) {
   EXPECT_EQ(find(read(house(charge("C-A1-0") + towards_a))).refusal, "no two frames are alike");
 }
 
+TEST(Condense, WhatIsTakenOutBeforehandMakesNoDifference) {
+  product::Plan plan = read(house(charge("C-A*-0")));
+  product::Member wall = plan.members[static_cast<size_t>(plan.find_member("B-A1B1-1"))];
+  wall.kind = product::MemberKind::Wall, wall.name = "wall", wall.removed = true;
+  plan.members.push_back(wall);
+  product::Member shaft;
+  shaft.kind = product::MemberKind::Shaft, shaft.name = "shaft", shaft.removed = true;
+  shaft.frame_a = shaft.frame_b = -1;
+  plan.members.push_back(shaft);
+  EXPECT_THAT(find(plan).frames, ElementsAre(ElementsAre(0, 2), ElementsAre(1)));
+}
+
 TEST(Condense, SaysWhyItCannot) {
   const auto refusal = [](const std::string& text) { return find(read(text)).refusal; };
   EXPECT_THAT(refusal(house("[criteria]\nazimuth = \"90 deg\"\nazimuth_tolerance = \"15 deg\"\n")),

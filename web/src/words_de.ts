@@ -75,7 +75,7 @@ export const german: readonly (readonly [string, string])[] = [
   // stability
   ["Stability", "Standsicherheit"],
   ["Before the first charge", "Vor der ersten Ladung"],
-  ["Between \"{}\" and \"{}\"", "Zwischen „{}“ und „{}“"],
+  ["Between \"{a}\" and \"{a}\"", "Zwischen „{}“ und „{}“"],
   ["Zone {} is nearest to its resistance and uses {:.0f} % of it (margin {:.2f}); {}", "Zone {} ist ihrem Widerstand am nächsten und nutzt ihn zu {} % aus (Reserve {}); {}"],
   ["No zone is loaded; {}", "Keine Zone ist belastet; {}"],
   ["no zone has yielded", "keine Zone fließt"],
@@ -97,10 +97,10 @@ export const german: readonly (readonly [string, string])[] = [
   ["Heads of ground columns turn about {} here; about {} no equilibrium was found under dead load.", "Köpfe der Erdgeschossstützen drehen sich hier um {}; um {} wurde unter Eigengewicht kein Gleichgewicht gefunden."],
   ["It stands still.", "Es steht still."],
   ["not judged", "nicht beurteilt"],
-  ["Not judged: the run ends at {:.2f} s, before \"{}\".", "Nicht beurteilt: Die Rechnung endet bei {} s, vor „{}“."],
-  ["Not judged: \"{}\" begins before all charges of the stage before it have fired.", "Nicht beurteilt: „{}“ beginnt, bevor alle Ladungen der Zündstufe davor gezündet haben."],
+  ["Not judged: the run ends at {:.2f} s, before \"{a}\".", "Nicht beurteilt: Die Rechnung endet bei {} s, vor „{}“."],
+  ["Not judged: \"{a}\" begins before all charges of the stage before it have fired.", "Nicht beurteilt: „{}“ beginnt, bevor alle Ladungen der Zündstufe davor gezündet haben."],
   ["{*} It has not slowed down since the stage before, so that it may sway or fall: not judged.", "{} Es ist seit der Stufe davor nicht langsamer geworden, kann also schwingen oder fallen: nicht beurteilt."],
-  ["Not judged: the last frame before \"{}\" ({:.3f} s) is of {:.3f} s; a higher frame_rate keeps more.", "Nicht beurteilt: Das letzte Bild vor „{}“ ({} s) ist von {} s; eine höhere frame_rate behält mehr."],
+  ["Not judged: the last frame before \"{a}\" ({:.3f} s) is of {:.3f} s; a higher frame_rate keeps more.", "Nicht beurteilt: Das letzte Bild vor „{}“ ({} s) ist von {} s; eine höhere frame_rate behält mehr."],
   ["This is the margin of one instant: the least in the pause is {:.2f}, at {:.2f} s.", "Das ist die Reserve eines Augenblicks: Die kleinste in der Pause ist {}, bei {} s."],
   ["It still sways (still: below {:.2f} m/s).", "Es schwankt noch (still: unter {} m/s)."],
   // debris
