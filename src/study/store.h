@@ -72,8 +72,8 @@ class Store {
   std::optional<std::string> find_model(const std::string& hash);
   /// Adds a study, or replaces that of the same name.
   void put_study(const StudyRow&);
-  /// The same, if that of this name is still what it was: none, or one of its model, definition and state. Otherwise false,
-  /// and nothing is changed.
+  /// The same, if that of this name is still what it was: none, or one of its model, definition and state. Otherwise
+  /// false, and nothing is changed.
   bool begin_study(const StudyRow&, const std::optional<StudyRow>& there);
   std::optional<StudyRow> find_study(const std::string& name);
   /// Numbers of studies, and of those that are not finished.
