@@ -439,8 +439,11 @@ bool Forces::advance(double time, const Motion& motion, const std::vector<Vec3>&
   }
   for (size_t i = 0; i < rotational_.size(); ++i) {
     Zone& z = rotational_[i];
-    if (!z.state.live) continue;
     const mbs::RotationalElement& r = model_.rotational_elements[i];
+    if (!z.state.live) {
+      if (!z.is_loose && !z.is_released) z.angle = angle_of(motion, r.joint, z.angle);
+      continue;
+    }
     const mbs::Joint& j = model_.joints[static_cast<size_t>(r.joint.index)];
     if (z.is_loose) {
       advance_six(z, zone_.size() + i, j.parent, j.X_PF, j.child, j.X_CM);
@@ -712,9 +715,9 @@ void Forces::fill(double time, const Motion& motion, mbs::View& v) const {
   for (size_t i = 0; i < R; ++i) {
     const Zone& z = rotational_[i];
     fill_zone(E + i, time, z, v);
-    v.hinge_rotation[i] = z.is_released || (z.is_loose && z.state.live)
-                              ? z.state.deformation[5]
-                              : angle_of(motion, model_.rotational_elements[i].joint, z.angle);
+    v.hinge_rotation[i] = z.is_released                ? z.angle
+                          : z.is_loose && z.state.live ? z.state.deformation[5]
+                                                       : angle_of(motion, model_.rotational_elements[i].joint, z.angle);
     v.hinge_moment[i] = -z.state.resultant.c[5];
     v.hinge_normal[i] = !z.state.live ? 0 : z.is_loose ? z.state.resultant.c[0] : z.axial_force;
   }

@@ -648,6 +648,7 @@ void System::release_joint(size_t i, const char* reason) {
   const bool is_loosened = joints[i].rotational >= 0 && is_loose(r);
   const bool has_element = is_loosened || (joints[i].rotational >= 0 && state.rotational[r].live);
   if (!state.joint[i].live && !has_element) return;  // neither it nor what has taken over from it
+  if (joints[i].rotational >= 0 && state.joint[i].live) state.rotational[r].deformation[5] = state.joint[i].angle;
   drop_joint(i);
   if (is_loosened) {
     unpack_element(E + r);

@@ -279,6 +279,7 @@ void make_random(Problem& p, const product::Plan& plan) {
   p.curves.clear();
   p.site = {};
   if (p.horizon) p.horizon->output.clear();  // a point's touchdowns are those of its inner runs
+  if (!p.asked.empty()) p.not_judged.emplace_back("mechanism");
   p.asked.clear();
   for (const Limit& l : p.limits) p.not_judged.push_back(l.output);
   p.limits.clear();

@@ -183,15 +183,34 @@ bool may_change(const Problem& p, const StudyResult& r, const uncertainty::Sampl
   return at != r.outputs.end() && index < run.result.values.size() && run.result.values[index] > 0;
 }
 
+/// The same of points whose inner runs may have ended so: only a statistic of theirs tells it.
+void doubt_points(const Problem& p, const StudyResult& r, Sentence& s) {
+  const std::string wanted = fmt::format("p(touchdown>={:g})", p.horizon->after);
+  const auto is_wanted = [&](std::string name) {
+    std::erase(name, ' ');
+    return name == wanted;
+  };
+  const auto at = std::ranges::find_if(r.outputs, is_wanted);
+  if (at == r.outputs.end()) {
+    s.text += fmt::format(
+        " Whether something had touched down in each inner run is not known: p(touchdown >= {:.4g}) would tell it.",
+        p.horizon->after);
+    s.status = Status::Info;
+    return;
+  }
+  const auto index = static_cast<std::size_t>(at - r.outputs.begin());
+  const auto points = std::ranges::count_if(r.alpha.archive.samples(), [index](const uncertainty::Sample& one) {
+    return index < one.result.values.size() && one.result.values[index] > 0;
+  });
+  if (points == 0) return;
+  s.text += fmt::format(" But in {} of the runs, inner ones ended before anything had touched down.", points);
+  s.status = Status::Warning;
+}
+
 /// A sentence that says that all is well does not, where runs ended in the middle.
 void doubt(const Problem& p, const StudyResult& r, Sentence& s) {
+  if (s.status == Status::Good && p.random && p.horizon) return doubt_points(p, r, s);
   const int unfinished = count_unfinished(p, r);
-  if (s.status == Status::Good && p.random && p.horizon) {
-    s.text +=
-        fmt::format(" Whether something had touched down in each inner run is not told: p(touchdown >= {:.4g}) is.",
-                    p.horizon->after);
-    s.status = Status::Info;
-  }
   if (unfinished == 0 || s.status != Status::Good) return;
   s.text += fmt::format(" But {} of the runs ended before anything had touched down.", unfinished);
   s.status = Status::Warning;

@@ -167,6 +167,21 @@ TEST(RotationalElementPhysics, RemovedItLetsItsJointTurnFreely) {
   }
 }
 
+TEST(RotationalElementPhysics, StaysAtTheRotationAtWhichItsJointWent) {
+  constexpr double rate = 0.4, stiffness = 200;
+  double w = 0;
+  Model m = make_turning_bar(rate, stiffness, w);
+  Event removed = make_event(0.1, Action::Kind::RemoveElement, 0);
+  removed.actions[0].element = {}, removed.actions[0].rotational = 0;
+  m.events = {removed, make_event(0.2, Action::Kind::ReleaseJoint, 0)};
+  Options o = options_of(0.3, 5e-4);
+  View last;
+  o.on_frame = [&](const View& v) { last = v; };
+  (void)run(m, o);
+  EXPECT_TRUE(last.joint_released[0]);
+  EXPECT_NEAR(last.hinge_rotation[0], rate / w * std::sin(w * 0.1) + 0.1 * rate * std::cos(w * 0.1), 5e-4 * rate);
+}
+
 TEST(LoosenJointPhysics, GoesOnBearingWhatTheJointDid) {
   // a box on a post and one that hangs beside it, both at rest: nothing moves when their joints are loosened
   for (const double side : {0.0, 0.3}) {
