@@ -232,13 +232,13 @@ void print_confirmation(std::FILE* out, const Problem& p, const StudyResult& r) 
   print_line(out, fmt::format("bounds: {} confirmed, {} exceeded, {} not reached, {} not run (at most {} whole runs)",
                               count(State::Confirmed), count(State::Exceeded), count(State::NotReached),
                               count(State::NotRun), c.limit));
-  for (const auto& o : c.outcomes) {
-    if (r.outcomes.size() == 1 && r.outcomes[0].empty()) break;  // points of random inputs have none
-    print_line(out, fmt::format("{}, most possible run, whole: {}", study::words_of_outcome(r, o.outcome),
-                                o.state == State::NotRun      ? "not run"
-                                : o.state == State::Confirmed ? "the same"
-                                                              : study::words_of_outcome(r, o.whole)));
-  }
+  const bool has_outcomes = r.outcomes.size() != 1 || !r.outcomes[0].empty();  // points of random inputs have none
+  if (has_outcomes)
+    for (const auto& o : c.outcomes)
+      print_line(out, fmt::format("{}, most possible run, whole: {}", study::words_of_outcome(r, o.outcome),
+                                  o.state == State::NotRun      ? "not run"
+                                  : o.state == State::Confirmed ? "the same"
+                                                                : study::words_of_outcome(r, o.whole)));
   for (const auto& b : c.bounds) {
     if (b.state != State::Exceeded && b.state != State::NotReached) continue;
     const auto& level = r.alpha.outputs[static_cast<std::size_t>(b.output)].levels[static_cast<std::size_t>(b.level)];

@@ -140,11 +140,14 @@ void System::remove_rotational(size_t r, const Ending& ending) {
   ZoneState& z = state.rotational[r];
   if (!z.live) return;
   end_rotational(r, ending);
-  if (!z.live) return;
+  if (z.live) take_away(z);
+  mark_links_due();
+}
+
+void System::take_away(ZoneState& z) {
   state.removed += z.energy + z.damper_energy;
   z.energy = z.damper_energy = 0;
   break_zone(z, BreakReason::Removed);
-  mark_links_due();
 }
 
 void System::end_joint(size_t i, const Ending& ending) {

@@ -138,6 +138,9 @@ enum FlowCell : int {
 inline constexpr double kLongestIdle = 50, kLongestIdleAgain = 200;
 /// Most flexibility that damage adds, over the elastic one: unloading keeps a twentieth of the stiffness.
 inline constexpr double kMostDamage = 19;
+/// Of two stations that turn one after the other, and the share of its rotation by which none turns any more then.
+inline constexpr int kMostSweeps = 200;
+inline constexpr double kStill = 1e-11;
 
 /// Fields of a body's constants.
 enum BodyField : int {

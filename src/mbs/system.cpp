@@ -405,17 +405,17 @@ double System::calc_hinge_rotation(size_t i) const {
   return j.live ? j.angle : state.rotational[i].deformation[5];
 }
 
+double System::calc_cable_length(size_t i) const {
+  const Cable& k = model.cables[i];
+  return norm(calc_point(k.b.index, k.p_B) - calc_point(k.a.index, k.p_A));
+}
+
 void System::evaluate_cables(bool at_rest) {
   for (size_t i = 0; i < model.cables.size(); ++i) {
     CableState& c = state.cable[i];
     if (!c.live) continue;
     const Cable& k = model.cables[i];
-    const auto point = [&](BodyId id, const Vec3& p) {
-      if (id == kGround) return p;
-      const size_t b = static_cast<size_t>(id.index);
-      return state.p[b] + state.R[b] * (p - state.p_offset[b]);
-    };
-    const Vec3 p_A = point(k.a, k.p_A), p_B = point(k.b, k.p_B), d = p_B - p_A;
+    const Vec3 p_A = calc_point(k.a.index, k.p_A), p_B = calc_point(k.b.index, k.p_B), d = p_B - p_A;
     const double length = norm(d), stretch = length - c.rest_length;
     const double before = c.force;
     c.force = stretch > 0 ? k.stiffness * stretch : 0;
@@ -487,11 +487,7 @@ void System::act(const DueEvent& due) {
         if (!z.live) break;
         unpack_element(e);
         end_element(e, find_ending(time));
-        if (z.live) {
-          state.removed += z.energy + z.damper_energy;
-          z.energy = z.damper_energy = 0;
-          break_zone(z, BreakReason::Removed);
-        }
+        if (z.live) take_away(z);
         pack_element(e);
         mark_links_due();
         break;
@@ -993,9 +989,8 @@ void System::see() {
   v.cable_force.resize(s.cable.size());
   v.cable_length.resize(s.cable.size());
   for (size_t i = 0; i < s.cable.size(); ++i) {
-    const Cable& k = model.cables[i];
     v.cable_force[i] = s.cable[i].force;
-    v.cable_length[i] = norm(calc_point(k.b.index, k.p_B) - calc_point(k.a.index, k.p_A));
+    v.cable_length[i] = calc_cable_length(i);
   }
   view_forces(v);
   v.contact_force_ground = ground_contact;

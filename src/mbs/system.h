@@ -483,6 +483,9 @@ class System {
   /// Rotation of a rotational element's joint, or of what has taken over from it; of one that is gone as it was [rad].
   double calc_hinge_rotation(size_t rotational) const;
   void remove_rotational(size_t rotational, const Ending& ending);
+  /// Breaks a live zone; what it stores counts as removed.
+  void take_away(ZoneState&);
+  double calc_cable_length(size_t cable) const;
   /// Whether a rotational element has taken over from its joint and still holds.
   bool is_loose(size_t rotational) const { return state.element[E + rotational].live; }
   /// The same whether it still holds or not.

@@ -115,10 +115,8 @@ double System::calc_component(const Quantity& q, int component) {
     }
     case Quantity::Kind::TorsionTorque:
       return component_of(s.torsion[i].component.spring + s.torsion[i].component.damper, component);
-    case Quantity::Kind::CableLength: {
-      const Cable& k = model.cables[i];
-      return component_of(norm(calc_point(k.b.index, k.p_B) - calc_point(k.a.index, k.p_A)), component);
-    }
+    case Quantity::Kind::CableLength:
+      return component_of(calc_cable_length(i), component);
     case Quantity::Kind::CableForce:
       return component_of(s.cable[i].force, component);
   }

@@ -757,7 +757,7 @@ struct Evaluation {
       }
     }
     if (!outside[0] || !outside[1] || turn_both(scale)) return;
-    take_turns(200, 1e-11, [&](int s) {
+    take_turns(kernel::kMostSweeps, kernel::kStill, [&](int s) {
       if (is_outside(limits[s], s, scale[s])) (void)turn(s, scale[s]);
     });
   }

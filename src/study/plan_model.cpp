@@ -150,10 +150,8 @@ void list_debris_limits(const product::Plan& plan, const PlanMappingOptions& opt
   }
 }
 
-/// The planned direction of fall, with the rules' tolerance [rad] where the plan has none. That the building stands
-/// between stages is the outcome "early", that it shall not is for a run to judge.
+/// The planned direction of fall, with the rules' tolerance [rad] where the plan has none.
 void list_direction_limit(const product::Plan& plan, const PlanMappingOptions& options, double usual, Problem& p) {
-  if (plan.criteria.stands_between_stages == false) p.not_judged.emplace_back("stands_between_stages");
   if (!plan.criteria.azimuth) return;
   const double most = plan.criteria.azimuth_tolerance.value_or(usual);
   if (has_clearances(options))
@@ -342,6 +340,8 @@ Problem make_plan_problem(const product::Plan& asked, const PlanMappingOptions& 
       if (n.vibration_limit > 0 || n.building_class != product::BuildingClass::Unknown)
         p.not_judged.push_back("vibration: \"" + n.name + "\"");
   }
+  // that the building stands between stages is the outcome "early", that it shall not is for a run to judge
+  if (plan.criteria.stands_between_stages == false) p.not_judged.emplace_back("stands_between_stages");
   list_direction_limit(plan, options, read_rules(rules).mechanism_direction_tolerance, p);
   if (options.condensed) {
     PlanMappingOptions whole = options;

@@ -329,25 +329,16 @@ void Store::put_study(const StudyRow& s) {
 
 bool Store::begin_study(const StudyRow& s, const std::optional<StudyRow>& there) {
   std::vector<Value> values = {s.name, s.model, s.definition, s.state, s.summary};
-  if (!there)
-    return transact(
-        [&](bool) {
-          const char* insert =
-              "INSERT INTO study(name, model, definition, state, summary) VALUES ($1, $2, $3, $4, $5) ON CONFLICT "
-              "(name) "
-              "DO NOTHING RETURNING name";
-          return !db_->run(insert, values).empty();
-        },
-        true);
-  values.insert(values.end(), {there->model, there->definition, there->state});
-  return transact(
-      [&](bool) {
-        const char* update =
-            "UPDATE study SET model = $2, definition = $3, state = $4, summary = $5 WHERE name = $1 AND model = $6 AND "
-            "definition = $7 AND state = $8 RETURNING name";
-        return !db_->run(update, values).empty();
-      },
-      true);
+  const char* statement =
+      "INSERT INTO study(name, model, definition, state, summary) VALUES ($1, $2, $3, $4, $5) ON CONFLICT (name) DO "
+      "NOTHING RETURNING name";
+  if (there) {
+    values.insert(values.end(), {there->model, there->definition, there->state});
+    statement =
+        "UPDATE study SET model = $2, definition = $3, state = $4, summary = $5 WHERE name = $1 AND model = $6 AND "
+        "definition = $7 AND state = $8 RETURNING name";
+  }
+  return transact([&](bool) { return !db_->run(statement, values).empty(); }, true);
 }
 
 std::optional<StudyRow> Store::find_study(const std::string& name) {

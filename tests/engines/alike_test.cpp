@@ -224,6 +224,14 @@ TEST_P(EnginesAlikeReference, LoadsInBothFrames) {
   expect_alike(m, 1.5, 2e-6);
 }
 
+/// Of the first joint.
+mbs::RotationalElement make_hinge() {
+  mbs::RotationalElement e;
+  e.joint = {0};
+  e.stiffness = 20;
+  return e;
+}
+
 TEST_P(EnginesAlikeReference, RotationalElementsAndSprings) {
   NEEDS_ENGINE();
   mbs::Model m = test::make_bar(Kind::Revolute, test::z_along_y());
@@ -234,19 +242,14 @@ TEST_P(EnginesAlikeReference, RotationalElementsAndSprings) {
   s.spring.rate = 15;
   s.damper.rate = 0.5;
   m.rotational_springs.push_back(s);
-  mbs::RotationalElement e;
-  e.joint = {0};
-  e.stiffness = 20;
-  m.rotational_elements.push_back(e);
+  m.rotational_elements.push_back(make_hinge());
   expect_alike(m, 2, 3e-7);
 }
 
 TEST_P(EnginesAlikeReference, AJointThatIsLoosened) {
   NEEDS_ENGINE();
   mbs::Model m = test::make_bar(Kind::Revolute, test::z_along_y());
-  mbs::RotationalElement e;
-  e.joint = {0};
-  e.stiffness = 20;
+  mbs::RotationalElement e = make_hinge();
   e.loose_translational = {4e3, 3e3, 5e3};
   e.loose_torsion = 30, e.loose_bending = 40;
   m.rotational_elements.push_back(e);
@@ -275,10 +278,7 @@ TEST_P(EnginesAlikeReference, AJointThatIsLoosened) {
 TEST_P(EnginesAlikeReference, ARotationalElementThatIsRemoved) {
   NEEDS_ENGINE();
   mbs::Model m = test::make_bar(Kind::Revolute, test::z_along_y());
-  mbs::RotationalElement e;
-  e.joint = {0};
-  e.stiffness = 20;
-  m.rotational_elements.push_back(e);
+  m.rotational_elements.push_back(make_hinge());
   mbs::Event event;
   event.time = 0.4;
   event.actions.resize(1);
@@ -388,9 +388,7 @@ TEST_P(EnginesAlikeReference, AHingeThatHasBrokenTurnsFreely) {
   law.moment_z = law.moment_y;
   law.rupture_rotation = 0.2;
   m.laws.push_back(law);
-  mbs::RotationalElement e;
-  e.joint = {0};
-  e.stiffness = 20;
+  mbs::RotationalElement e = make_hinge();
   e.law = {0};
   m.rotational_elements.push_back(e);
   const EngineRun r = compare_with_native(m, 1.5);

@@ -666,34 +666,39 @@ TEST(Zone, AStationThatDoesNotTurnSpringsBack) {
   EXPECT_NEAR(w.z.station[1].phi[1], damaged.phi[1], 1e-12);
 }
 
-TEST(Zone, ItDoesNotMatterWhichStationIsListedFirst) {
-  // random walks about both axes at once
-  std::mt19937 random(7);
+/// Walks at random about both axes at once, with the stations listed one way and the other; how far both have turned.
+///   near  share of the limit by which moments and shears may differ
+double walk_both_ways(std::mt19937& random, const ZoneParameters& member, double damage, int legs, double near) {
   std::uniform_real_distribution<double> even(-1, 1);
   constexpr int bending[] = {1, 2, 4, 5};
+  constexpr double limit = 100e3;
+  ZoneLaw law = test::plastic_hinge(limit);
+  law.moment_y = law.moment_z, law.damage_share = damage;
+  Walk one(law, member), other(law, member);
+  std::swap(other.p.x[0], other.p.x[1]);
+  for (int leg = 0; leg < legs; ++leg) {
+    const Six from = one.before;
+    Six to;
+    for (int c : bending) to.c[c] = 0.02 * even(random);
+    for (int i = 1; i <= 200; ++i) {
+      Six at = from;
+      for (int c : bending) at.c[c] += (to.c[c] - from.c[c]) * i / 200;
+      one.go(at, 1), other.go(at, 1);
+      for (int c : bending)
+        EXPECT_NEAR(one.z.resultant.c[c], other.z.resultant.c[c], near * limit) << damage << " " << leg << " " << i;
+    }
+  }
+  double turned = 0;
+  for (int s : {0, 1}) turned = std::max(turned, std::min(one.z.station[s].reached, other.z.station[1 - s].reached));
+  return turned;
+}
+
+TEST(Zone, ItDoesNotMatterWhichStationIsListedFirst) {
+  std::mt19937 random(7);
   for (const double damage : {0.0, 0.3}) {
     double turned = 0;
-    for (int walk = 0; walk < 8; ++walk) {
-      ZoneLaw law = test::plastic_hinge(100e3);
-      law.moment_y = law.moment_z, law.damage_share = damage;
-      Walk one(law, test::make_member()), other(law, test::make_member());
-      std::swap(other.p.x[0], other.p.x[1]);
-      for (int leg = 0; leg < 6; ++leg) {
-        const Six from = one.before;
-        Six to;
-        for (int c : bending) to.c[c] = 0.02 * even(random);
-        for (int i = 1; i <= 200; ++i) {
-          Six at = from;
-          for (int c : bending) at.c[c] += (to.c[c] - from.c[c]) * i / 200;
-          one.go(at, 1), other.go(at, 1);
-          for (int c : bending)
-            ASSERT_NEAR(one.z.resultant.c[c], other.z.resultant.c[c], 1e-7 * 100e3)
-                << damage << " " << walk << " " << i;
-        }
-      }
-      for (int s : {0, 1})
-        turned = std::max(turned, std::min(one.z.station[s].reached, other.z.station[1 - s].reached));
-    }
+    for (int walk = 0; walk < 8; ++walk)
+      turned = std::max(turned, walk_both_ways(random, test::make_member(), damage, 6, 1e-7));
     EXPECT_GT(turned, 0.01);
   }
 }
@@ -701,26 +706,10 @@ TEST(Zone, ItDoesNotMatterWhichStationIsListedFirst) {
 TEST(Zone, ItDoesNotMatterWhichStationOfADeepOrSlenderMemberIsListedFirst) {
   // stations that hardly feel themselves beside the other one: many turns
   std::mt19937 random(11);
-  std::uniform_real_distribution<double> even(-1, 1);
   for (const double deep : {0.05, 10.0}) {
-    ZoneLaw law = test::plastic_hinge(100e3);
-    law.moment_y = law.moment_z, law.damage_share = 0;
     ZoneParameters member = test::make_member();
     member.stiffness[1] *= deep, member.stiffness[2] *= deep;
-    Walk one(law, member), other(law, member);
-    std::swap(other.p.x[0], other.p.x[1]);
-    for (int leg = 0; leg < 20; ++leg) {
-      const Six from = one.before;
-      Six to;
-      for (int c : {1, 2, 4, 5}) to.c[c] = 0.02 * even(random);
-      for (int i = 1; i <= 200; ++i) {
-        Six at = from;
-        for (int c : {1, 2, 4, 5}) at.c[c] += (to.c[c] - from.c[c]) * i / 200;
-        one.go(at, 1), other.go(at, 1);
-        for (int c : {4, 5})
-          ASSERT_NEAR(one.z.resultant.c[c], other.z.resultant.c[c], 1e-6 * 100e3) << deep << " " << leg << " " << i;
-      }
-    }
+    EXPECT_GT(walk_both_ways(random, member, 0, 20, 1e-6), 0.01);
   }
 }
 
