@@ -102,6 +102,7 @@ struct BuilderState {
   bool hinge_about_y = true;
   Heads heads = Heads::OfTheFall;
   // of charges, which may be laid out anew while the model runs: laws are never taken out, so that their ids stay
+  std::map<std::pair<int, int>, int> partial_zones;  // stage and charge -> zone of a length that keeps some concrete
   std::map<std::tuple<int, double, double, double>, mbs::LawId> cage_laws;  // by element, length, bars and place
   std::map<std::tuple<int, double, double, std::string>, mbs::LawId> hinge_laws;
 };
@@ -193,6 +194,8 @@ struct Builder : BuilderState {
   mbs::LawId hinge_law_of(int zone, const Stiffness&, const std::string& name, const Lever& = {});
   ///   length  of the stub [m]
   mbs::LawId stub_law_of(int zone, const Stiffness&, int member, double length);
+  /// What a charge leaves of a member where some of its concrete stays.
+  mbs::LawId partial_law_of(const Firing&, const MemberZones&, size_t station);
   void make_stub(const product::Charge&, const MemberZones&, mbs::Event& event, mbs::Event& lighter);
   Pose frame_in(int body, const Vec3& p_W, const Mat3& R_WF) const;
   mbs::ElementId add_element(const std::string& name, int member, int a, int b, const Vec3& p_W, const Mat3& R_WF,

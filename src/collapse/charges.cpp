@@ -50,6 +50,22 @@ std::vector<Firing> Builder::order_firings() const {
   return out;
 }
 
+mbs::LawId Builder::partial_law_of(const Firing& firing, const MemberZones& z, size_t station) {
+  const product::Charge& c = charge_of(firing);
+  const Member& m = member(c.member);
+  const int zone = partial_zones.at({firing.stage, firing.charge});
+  const Stiffness s = calc_stiffness(z);
+  const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, fmt::format("{}/charge of {} m", m.name, c.destroyed_length));
+  if (const auto it = hinge_laws.find(key); it != hinge_laws.end()) return it->second;
+  const Bending bending = m.kind == MemberKind::Column ? bending_of_column() : bending_of_x_beam();
+  const Lever& lever = z.lever[station];
+  const std::string name = m.name + "/charge";
+  const mbs::SharedLaw beside = make_law(z.station[station].zone, s, name, bending, lever);
+  mbs::ZoneLaw law = make_partial_law(*make_law(zone, s, name, bending, lever), c.destroyed_length, *beside);
+  law.name = name;
+  return hinge_laws[key] = mbs::add_law(model, std::move(law));
+}
+
 /// What is above a charge in a column of the ground storey becomes a stub under its joint: whatever it meets can crush
 /// it, shear it off or turn it.
 void Builder::make_stub(const product::Charge& c, const MemberZones& z, mbs::Event& event, mbs::Event& lighter) {
@@ -144,6 +160,7 @@ void Builder::add_events(std::vector<Firing> schedule) {
   std::set<std::string> without_zone;             // members with damage beside a charge that no zone has
   std::map<int, const product::Charge*> weakest;  // element -> charge so far that leaves least of it
   std::map<int, double> highest;                  // column -> upper end of what charges so far destroyed [m]
+  std::vector<const Firing*> partial;             // of lengths that are not wholly destroyed
   std::set<size_t> loose_cables;                  // tied to what charges so far destroyed
   const std::vector<Firing> firings = order_firings();
   // a higher charge makes the stub if it fires in the same instant
@@ -154,70 +171,11 @@ void Builder::add_events(std::vector<Firing> schedule) {
     });
   };
 
-  for (const Firing& firing : firings) {
-    const product::Charge& c = charge_of(firing);
+  // a destroyed length is thrown out, and with it what it cuts off from the part of a column above it
+  const auto throw_out = [&](const product::Charge& c, int axis, double from, double to,
+                             const std::function<bool(const Part&)>& applies, mbs::Event& lighter, EventEntry& entry) {
     const Member& m = member(c.member);
-    // a beam between frames has no zones of its own in a condensed model and is refused before
-    if (!has_frame(m.frame_a)) continue;
     const bool is_shaft = m.kind == MemberKind::Shaft;
-    if (is_shaft && !shafts.count(c.member)) continue;
-    const MemberZones& z = zones[c.member];
-    const int axis = m.kind == MemberKind::Column || is_shaft ? 2 : m.row_a != m.row_b ? 0 : 1;
-    double from = m.start[axis] + c.position - 0.5 * c.destroyed_length;
-    // a column that was not built with a stump leaves nothing below its charge
-    if (m.kind == MemberKind::Column && !lowest_charge.count(c.member)) from = m.start[axis];
-    const double to = m.start[axis] + c.position + 0.5 * c.destroyed_length;
-    const bool is_beam = m.kind == MemberKind::Beam;
-    int which = is_beam ? find_nearer_station(z, c.position) : 0;
-    // a piece between a gap and a joint that is no longer than those that cut_member takes along
-    const auto reaches = [&](int end) {
-      return std::abs(c.position - z.station[static_cast<size_t>(end)].at) < 0.5 * c.destroyed_length + kSliver;
-    };
-
-    mbs::Event event;
-    event.name = m.name;
-    // concrete and stiffness go together, when the ramp of the limits is over
-    mbs::Event lighter;
-    lighter.time = firing.time + k.charge_release_time;
-    lighter.name = m.name + " thrown out";
-    event.time = firing.time;
-    EventEntry entry{firing.stage, firing.charge, m.name, firing.time, 0, false, {}};
-
-    const int element = z.element[which];
-    std::function<bool(const Part&)> applies;
-    if (is_shaft) {
-      fire_shaft(firing, event, lighter);
-      applies = [&c, &m](const Part& p) {
-        // a stave in the middle of two charges belongs to one
-        const double at = std::atan2(p.centre.y - m.start.y, p.centre.x - m.start.x) - 1e-7;
-        return p.is_solid && product::is_in_sector(at, c.azimuth, c.opening);
-      };
-    }
-    for (const int end : {0, 1}) {
-      const int reached = z.element[end];
-      if (is_shaft || (end != which && !(is_beam && reached != element && reaches(end)))) continue;
-      const auto it = weakest.find(reached);
-      if (it != weakest.end() && !leaves_less(c, *it->second)) continue;
-      weakest[reached] = &c;
-      mbs::Action act;
-      act.kind = mbs::Action::Kind::SwitchLaw;
-      act.element = mbs::ElementId{reached};
-      act.ramp = k.charge_release_time;
-      const nearfield::ZoneInput& in = library.input(z.station[static_cast<size_t>(end)].zone);
-      const nearfield::ResidualCage cage = make_residual_cage(in, c.destroyed_length, c.residual_bars);
-      const auto key = std::make_tuple(reached, c.destroyed_length, c.residual_bars, c.position);
-      if (!cage_laws.count(key))
-        cage_laws[key] = mbs::add_law(model, make_cage_law(cage, c.destroyed_length, m.name + "/charge", k));
-      act.law = cage_laws[key];
-      // bars alone are as soft as they are long
-      const double before = model.elements[static_cast<size_t>(reached)].translational_stiffness.x;
-      act.stiffness_share = std::clamp(cage.EA / (c.destroyed_length * before), kLeastStiffnessShare, 1.0);
-      event.actions.push_back(act);
-      ZoneEntry& zone = map.elements[static_cast<size_t>(reached)];
-      zone.firing_time = std::min(zone.firing_time, firing.time);
-    }
-
-    // the destroyed length is thrown out, and with it what it cuts off from the part of a column above it
     const int below = stump_body.count(c.member) ? stump_body.at(c.member) : -1;
     const double loose_from = below < 0 ? from : std::min(from, m.start.z + lowest_charge.at(c.member));
     for (size_t i = 0; i < std::min(plan.cables.size(), model.cables.size()); ++i) {
@@ -247,7 +205,7 @@ void Builder::add_events(std::vector<Firing> schedule) {
       if (removed.empty()) continue;
       for (const Part& p : removed) {
         entry.debris_mass += p.mass;
-        map.debris.push_back({m.name, m.storey, p.mass, p.centre, p.half, firing.time, p.turn, volume_of(p)});
+        map.debris.push_back({m.name, m.storey, p.mass, p.centre, p.half, entry.time, p.turn, volume_of(p)});
       }
       mbs::Body replacement = make_body(a, k);
       const Vec3 p_WB = replacement.X_WB.p;
@@ -267,8 +225,91 @@ void Builder::add_events(std::vector<Firing> schedule) {
       act.replacement = std::move(replacement);
       lighter.actions.push_back(std::move(act));
     }
+  };
+
+  for (const Firing& firing : firings) {
+    const product::Charge& c = charge_of(firing);
+    const Member& m = member(c.member);
+    // a beam between frames has no zones of its own in a condensed model and is refused before
+    if (!has_frame(m.frame_a)) continue;
+    const bool is_shaft = m.kind == MemberKind::Shaft;
+    if (is_shaft && !shafts.count(c.member)) continue;
+    const MemberZones& z = zones[c.member];
+    const int axis = m.kind == MemberKind::Column || is_shaft ? 2 : m.row_a != m.row_b ? 0 : 1;
+    double from = m.start[axis] + c.position - 0.5 * c.destroyed_length;
+    // a column that was not built with a stump leaves nothing below its charge
+    if (m.kind == MemberKind::Column && !lowest_charge.count(c.member)) from = m.start[axis];
+    const double to = m.start[axis] + c.position + 0.5 * c.destroyed_length;
+    const bool is_beam = m.kind == MemberKind::Beam, is_partial = c.residual_concrete > 0;
+    int which = is_beam ? find_nearer_station(z, c.position) : 0;
+    // a piece between a gap and a joint that is no longer than those that cut_member takes along
+    const auto reaches = [&](int end) {
+      return std::abs(c.position - z.station[static_cast<size_t>(end)].at) < 0.5 * c.destroyed_length + kSliver;
+    };
+
+    mbs::Event event;
+    event.name = m.name;
+    // concrete and stiffness go together, when the ramp of the limits is over
+    mbs::Event lighter;
+    lighter.time = firing.time + k.charge_release_time;
+    lighter.name = m.name + " thrown out";
+    event.time = firing.time;
+    EventEntry entry{firing.stage, firing.charge, m.name, firing.time, 0, c.residual_concrete, false, {}};
+
+    const int element = z.element[which];
+    std::function<bool(const Part&)> applies;
+    if (is_shaft) {
+      fire_shaft(firing, event, lighter);
+      applies = [&c, &m](const Part& p) {
+        // a stave in the middle of two charges belongs to one
+        const double at = std::atan2(p.centre.y - m.start.y, p.centre.x - m.start.x) - 1e-7;
+        return p.is_solid && product::is_in_sector(at, c.azimuth, c.opening);
+      };
+    }
+    for (const int end : {0, 1}) {
+      const int reached = z.element[end];
+      if (is_shaft || (end != which && !(is_beam && reached != element && reaches(end)))) continue;
+      const auto it = weakest.find(reached);
+      if (it != weakest.end() && !leaves_less(c, *it->second)) continue;
+      weakest[reached] = &c;
+      mbs::Action act;
+      act.kind = mbs::Action::Kind::SwitchLaw;
+      act.element = mbs::ElementId{reached};
+      act.ramp = k.charge_release_time;
+      if (is_partial) {
+        act.law = partial_law_of(firing, z, static_cast<size_t>(end));
+      } else {
+        const nearfield::ZoneInput& in = library.input(z.station[static_cast<size_t>(end)].zone);
+        const nearfield::ResidualCage cage = make_residual_cage(in, c.destroyed_length, c.residual_bars);
+        const auto key = std::make_tuple(reached, c.destroyed_length, c.residual_bars, c.position);
+        if (!cage_laws.count(key))
+          cage_laws[key] = mbs::add_law(model, make_cage_law(cage, c.destroyed_length, m.name + "/charge", k));
+        act.law = cage_laws[key];
+        // bars alone are as soft as they are long
+        const double before = model.elements[static_cast<size_t>(reached)].translational_stiffness.x;
+        act.stiffness_share = std::clamp(cage.EA / (c.destroyed_length * before), kLeastStiffnessShare, 1.0);
+      }
+      event.actions.push_back(act);
+      ZoneEntry& zone = map.elements[static_cast<size_t>(reached)];
+      zone.firing_time = std::min(zone.firing_time, firing.time);
+    }
+
+    if (is_partial)
+      partial.push_back(&firing);
+    else
+      throw_out(c, axis, from, to, applies, lighter, entry);
     if (m.kind == MemberKind::Column && m.storey == 0)
       for (GroundColumn& g : map.ground_columns) g.is_fired |= g.member == m.name;
+
+    // the hinge of a column that is not wholly destroyed stays
+    if (is_partial && z.rotational >= 0 && z.station[1].damaged >= 0) {
+      mbs::Action act;
+      act.kind = mbs::Action::Kind::SwitchLaw;
+      act.rotational = z.rotational;
+      act.ramp = k.charge_release_time;
+      act.law = hinge_law_of(z.station[1].damaged, calc_stiffness(z), m.name + "/transition", z.lever[1]);
+      event.actions.push_back(std::move(act));
+    }
 
     // transition zones
     bool weakens = is_shaft || (z.rotational >= 0 && z.station[1].damaged >= 0);
@@ -289,7 +330,8 @@ void Builder::add_events(std::vector<Firing> schedule) {
     }
     if (c.transition_damage > 0 && !weakens) without_zone.insert(m.name);
     const auto top = highest.try_emplace(c.member, 0).first;
-    if (z.rotational >= 0 && upper_end(c) > top->second && is_highest(firing)) make_stub(c, z, event, lighter);
+    if (!is_partial && z.rotational >= 0 && upper_end(c) > top->second && is_highest(firing))
+      make_stub(c, z, event, lighter);
     top->second = std::max(top->second, upper_end(c));
     model.events.push_back(std::move(event));
     map.events.push_back(entry);
@@ -299,6 +341,14 @@ void Builder::add_events(std::vector<Firing> schedule) {
     map.events.push_back(entry);
   }
 
+  if (!partial.empty()) {
+    const product::Charge& first = charge_of(*partial.front());
+    map.remarks.push_back(
+        {"Lengths not wholly destroyed",
+         fmt::format("Charges that leave part of the concrete: {} (the first leaves {:.3g} % on {}). Nothing is thrown "
+                     "out there; what is left is crushed, bent and sheared off as a section of its own.",
+                     partial.size(), 100 * first.residual_concrete, member(first.member).name)});
+  }
   if (!without_zone.empty())
     map.remarks.push_back(
         {"Damage without effect", fmt::format("Members in which the damage beside charges (transition_damage) changes "

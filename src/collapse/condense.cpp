@@ -35,7 +35,7 @@ std::string describe(const product::Plan& plan, size_t index) {
     for (const product::Charge& c : plan.stages[s].charges)
       if (c.member == static_cast<int>(index))
         for (const double v : {static_cast<double>(s), c.position, c.destroyed_length, c.residual_bars,
-                               c.transition_damage, c.delay, c.scatter, c.fails ? 1.0 : 0.0})
+                               c.residual_concrete, c.transition_damage, c.delay, c.scatter, c.fails ? 1.0 : 0.0})
           append_length(key, v);
   return key;
 }

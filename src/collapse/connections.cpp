@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "collapse/builder.h"
+#include "nearfield/fired.h"
 
 namespace topple::collapse {
 
@@ -149,12 +150,18 @@ void Builder::request_station(int index, int which) {
     in.cut_concrete = std::max(in.cut_concrete, w.cut_concrete);
   }
   station.zone = library.request(in);
-  // a charge elsewhere in the member may reach this zone
   if (is_column && m.storey > 0) return;
-  for (const product::Stage& stage : plan.stages)
-    for (const product::Charge& c : stage.charges) {
-      if (c.member != index || c.fails || !(c.transition_damage > 0)) continue;
+  const nearfield::ZoneInput prepared = in;
+  for (size_t stage = 0; stage < plan.stages.size(); ++stage)
+    for (size_t i = 0; i < plan.stages[stage].charges.size(); ++i) {
+      const product::Charge& c = plan.stages[stage].charges[i];
+      if (c.member != index || c.fails) continue;
       const bool acts_here = which == (is_column ? 0 : find_nearer_station(z, c.position));
+      if (acts_here && c.residual_concrete > 0)
+        partial_zones[{static_cast<int>(stage), static_cast<int>(i)}] = library.request(nearfield::make_partial_zone(
+            prepared, {c.destroyed_length, c.residual_bars, c.transition_damage, c.residual_concrete}));
+      // a charge elsewhere in the member may reach this zone
+      if (!(c.transition_damage > 0)) continue;
       const double gap = std::abs(c.position - station.at) - 0.5 * c.destroyed_length;
       if (acts_here || gap > k.charge_transition_reach * depth) continue;
       in.concrete_loss = std::max(in.concrete_loss, c.transition_damage);

@@ -143,11 +143,13 @@ Edit read_edit(const Json& command) {
       e.time = read_optional(command, "time");
       break;
     case Kind::AddCharge:
-      keys({"member", "position", "destroyed_length", "residual_bars", "transition_damage", "time"});
+      keys({"member", "position", "destroyed_length", "residual_bars", "residual_concrete", "transition_damage",
+            "time"});
       e.member = read_text(command, "member");
       e.position = read_number(command, "position");
       e.destroyed_length = read_number(command, "destroyed_length");
       e.residual_bars = read_number(command, "residual_bars", 0);
+      e.residual_concrete = read_number(command, "residual_concrete", 0);
       e.transition_damage = read_number(command, "transition_damage", 0);
       e.time = read_optional(command, "time");
       break;

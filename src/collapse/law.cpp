@@ -328,15 +328,16 @@ mbs::Curve make_curve(const nearfield::AxialCurve& from) {
   return out;
 }
 
+constexpr double kRise = 0.05;  // of the length, from what is left of one zone to what is crushed next
+
 /// Continues a zone's curve behind its length with the mean force of being crushed, for what is crushed then is the
 /// next zone of the member.
 void append_mean_force(double length, mbs::Curve& c) {
-  constexpr double rise = 0.05;  // of the length, from what is left of one zone to the mean of the others
   double work = 0;
   for (size_t i = 0; i + 1 < c.x.size(); ++i) work += 0.5 * (c.f[i] + c.f[i + 1]) * (c.x[i + 1] - c.x[i]);
   const double span = c.x.back();
   if (!(span > 0 && span <= length)) return;
-  c.x.push_back((1 + rise) * length);
+  c.x.push_back((1 + kRise) * length);
   c.f.push_back(work / span);
 }
 
@@ -393,7 +394,7 @@ int ZoneLibrary::request(const nearfield::ZoneInput& in) {
     for (double v : {flange.thickness, flange.top.depth, flange.top.area, flange.bottom.depth, flange.bottom.area,
                      flange.steel.fy, flange.steel.fu, flange.steel.Es, flange.steel.eps_u})
       put(v);
-  for (double v : {in.length, in.cut_bars, in.cut_concrete, in.concrete_loss}) put(v);
+  for (double v : {in.length, in.cut_bars, in.cut_concrete, in.concrete_loss, in.free_bars}) put(v);
   key += in.cover_lost ? 'c' : '-';
   const auto [found, is_new] = numbers_.emplace(std::move(key), static_cast<int>(inputs_.size()));
   if (is_new) {
@@ -506,6 +507,24 @@ double calc_crack_rotation(const mbs::Cracking& c, double moment) {
   if (c.flexibility == 0) return 0;
   if (moment >= c.end[0]) return c.flexibility * moment;
   return mbs::calc_crack_rotation(c, 0, std::max(moment, c.begin[0]));
+}
+
+mbs::ZoneLaw make_partial_law(mbs::ZoneLaw weak, double length, const mbs::ZoneLaw& beside) {
+  mbs::Curve& c = weak.compression;
+  // the mean force of what is crushed zone after zone holds as far as the length goes
+  const auto after = static_cast<size_t>(std::lower_bound(c.x.begin(), c.x.end(), length) - c.x.begin());
+  double last = c.f.back();
+  if (after > 0 && after < c.x.size())
+    last = std::lerp(c.f[after - 1], c.f[after], (length - c.x[after - 1]) / (c.x[after] - c.x[after - 1]));
+  c.x.resize(after), c.f.resize(after);
+  c.x.push_back(length), c.f.push_back(last);
+  const double begin = (1 + kRise) * length;
+  for (size_t i = 0; i < beside.compression.x.size(); ++i) {
+    c.x.push_back(begin + beside.compression.x[i]);
+    c.f.push_back(beside.compression.f[i]);
+  }
+  weak.crush_length = begin + beside.crush_length;
+  return weak;
 }
 
 mbs::ZoneLaw make_cage_law(const nearfield::ResidualCage& cage, double destroyed_length, const std::string& name,

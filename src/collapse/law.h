@@ -91,6 +91,10 @@ mbs::SharedLaw scale_lever(const mbs::SharedLaw&, const Lever&);
 ///   moment, rotation  of the lever, about the axis of the cracks
 mbs::Cracking scale_lever(mbs::Cracking, double moment, double rotation);
 
+/// The law of a length that a charge did not wholly destroy: when it is crushed through, the member beside it is next.
+///   weak    of what is left of the length;  length  destroyed [m];  beside  of the member as it was there
+mbs::ZoneLaw make_partial_law(mbs::ZoneLaw weak, double length, const mbs::ZoneLaw& beside);
+
 /// Law of the bars that a charge leaves; nothing at all if there are none.
 mbs::ZoneLaw make_cage_law(const nearfield::ResidualCage&, double destroyed_length, const std::string& name,
                            const Knowledge&);

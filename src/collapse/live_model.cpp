@@ -186,6 +186,15 @@ void LiveModel::refuse_in_stump(int member, double position) const {
                    "write the charge into the plan and apply it");
 }
 
+void LiveModel::request_zones_of(int member) {
+  if (plan_.members[static_cast<size_t>(member)].kind == MemberKind::Shaft) return;
+  Builder builder(std::move(built_), plan_, *k_, map_);
+  for (int which : {0, 1}) builder.request_station(member, which);
+  builder.library.compute(1);
+  built_ = std::move(static_cast<BuilderState&>(builder));
+  note_without_stump(member);
+}
+
 void LiveModel::note_without_stump(int member) {
   const Member& m = plan_.members[static_cast<size_t>(member)];
   if (m.kind == MemberKind::Column && !built_.lowest_charge.count(member))
@@ -198,8 +207,11 @@ std::string LiveModel::fire(const Edit& e, double time, double next) {
   refuse_in_stump(charge(c).member, charge(c).position);
   c.time = next;
   c.offset = 0;
-  if (c.fails) note_without_stump(charge(c).member);
-  c.fails = false;
+  if (c.fails) {
+    c.fails = false;
+    plan_.stages[static_cast<size_t>(c.stage)].charges[static_cast<size_t>(c.index)].fails = false;
+    request_zones_of(charge(c).member);
+  }
   return fmt::format("{} fires now, at {}", member_of(c), words_of_time(next));
 }
 
@@ -262,6 +274,9 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
   demand(product::is_within(e.destroyed_length, limits::destroyed_length), "destroyed_length must be 0.01 to 100 m");
   demand(is_share(e.residual_bars), "residual_bars must be 0 to 1");
   demand(is_share(e.transition_damage), "transition_damage must be 0 to 1");
+  demand(product::is_within(e.residual_concrete, limits::residual_concrete), "residual_concrete must be 0 to 0.95");
+  if (e.residual_concrete > 0 && !product::can_keep_concrete(m))
+    refuse("residual_concrete is known of columns of the ground storey and of beams along x");
   const double low = e.position - 0.5 * e.destroyed_length, high = e.position + 0.5 * e.destroyed_length;
   const double from = z.clear_start, to = z.clear_start + z.clear_length;
   demand(low >= from && high <= to,
@@ -272,6 +287,8 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
   for (const LiveCharge& c : charges_) {
     const product::Charge& other = charge(c);
     if (c.is_removed || other.member != index) continue;
+    if (e.residual_concrete > 0 || other.residual_concrete > 0)
+      refuse("has another charge, and one leaves concrete", "take that one out first");
     if (std::abs(other.position - e.position) < 0.5 * (other.destroyed_length + e.destroyed_length) - slack)
       refuse(fmt::format("has another charge on the same length, {:.3g} to {:.3g} m",
                          other.position - 0.5 * other.destroyed_length, other.position + 0.5 * other.destroyed_length),
@@ -289,16 +306,13 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
   c.position = e.position;
   c.destroyed_length = e.destroyed_length;
   c.residual_bars = e.residual_bars;
+  c.residual_concrete = e.residual_concrete;
   c.transition_damage = e.transition_damage;
   c.delay = t - plan_.stages[stage].time;
   plan_.stages[stage].charges.push_back(c);
   charges_.push_back(
       {static_cast<int>(stage), static_cast<int>(plan_.stages[stage].charges.size()) - 1, t, false, false, true});
-  Builder builder(std::move(built_), plan_, *k_, map_);
-  for (int which : {0, 1}) builder.request_station(index, which);
-  builder.library.compute(1);
-  built_ = std::move(static_cast<BuilderState&>(builder));
-  note_without_stump(index);
+  request_zones_of(index);
   return fmt::format("a charge on {} at {:.3g} m, destroying {:.3g} m, fires at {}", m.name, e.position,
                      e.destroyed_length, words_of_time(t));
 }

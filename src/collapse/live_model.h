@@ -64,6 +64,8 @@ class LiveModel {
  private:
   /// Below the lowest charge a column is a stump that stays (E933).
   void refuse_in_stump(int member, double position) const;
+  /// After a charge of its own has changed: what it leaves of the member's zones.
+  void request_zones_of(int member);
   void note_without_stump(int member);
   std::string fire(const Edit&, double time, double next);
   std::string set_delay(const Edit&, double time);

@@ -38,6 +38,7 @@ struct EventEntry {
   std::string member;
   double time = 0;            // [s]
   double debris_mass = 0;     // dropped from the model [kg]
+  double kept = 0;            // share of the concrete that stays
   bool is_aftermath = false;  // the concrete leaving, after the charge itself
   std::string note;           // of an event that is no charge: what is told of it
 };

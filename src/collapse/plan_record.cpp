@@ -155,6 +155,8 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
         what = fmt::format("mouth of {:.4g} deg at azimuth {:.4g} deg, ", c.opening / unit::deg, c.azimuth / unit::deg);
       what += fmt::format("{:.2f} m destroyed around {:.2f} m, {:.3g} % of the bars left.", c.destroyed_length,
                           c.position, 100 * c.residual_bars);
+      if (c.residual_concrete > 0)
+        what += fmt::format(" Not wholly: {:.3g} % of the concrete stays.", 100 * c.residual_concrete);
       if (c.transition_damage > 0) what += fmt::format(" Damage beside it: {:.3g} %.", 100 * c.transition_damage);
       if (c.scatter > 0) what += fmt::format(" Its time scatters by {:.3g} ms.", c.scatter * 1e3);
       if (c.fails) what += " It fails.";

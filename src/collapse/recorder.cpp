@@ -620,8 +620,11 @@ void Recorder::add_happening(const mbs::Happening& h) {
         add_event({h.time, "stage", map_.stages[static_cast<size_t>(entry.stage)],
                    map_.stages[static_cast<size_t>(entry.stage)]});
       }
-      add_event({h.time, "charge", entry.member,
-                 fmt::format("{} fired, {:.1f} t of concrete thrown out", entry.member, entry.debris_mass / unit::t)});
+      add_event(
+          {h.time, "charge", entry.member,
+           entry.kept > 0
+               ? fmt::format("{} fired, {:.3g} % of its concrete stays", entry.member, 100 * entry.kept)
+               : fmt::format("{} fired, {:.1f} t of concrete thrown out", entry.member, entry.debris_mass / unit::t)});
       break;
     }
     case Kind::ElementYielded: {

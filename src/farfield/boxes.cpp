@@ -98,6 +98,11 @@ std::vector<DestroyedLength> find_destroyed_lengths(const product::Plan& plan) {
     for (size_t c = 0; c < plan.stages[s].charges.size(); ++c) {
       const product::Charge& charge = plan.stages[s].charges[c];
       const Member& m = plan.members[static_cast<size_t>(charge.member)];
+      if (charge.residual_concrete > 0 && !charge.fails)
+        throw InputError(std::vector<Diagnostic>{
+            {Severity::Error, "E675", charge.where, 1,
+             m.name + ": in finite elements a charge takes all concrete of its length (residual_concrete)",
+             "topple run knows what stays"}});
       const int axis = axis_of(m);
       const double middle = m.start[axis] + charge.position, half = 0.5 * charge.destroyed_length;
       lengths.push_back({static_cast<int>(s), static_cast<int>(c), charge.member, axis,

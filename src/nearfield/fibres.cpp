@@ -83,6 +83,7 @@ material::Steel make_bar(const ZoneInput& in, double diameter) {
   // Without ties bars are free over the whole zone.
   const double spacing = in.section.tie_spacing;
   steel.free_length = spacing > 0 && in.section.tie_diameter > 0 ? std::min(spacing, in.length) : in.length;
+  if (in.free_bars > 0) steel.free_length = in.free_bars;
   steel.diameter = diameter;
   return material::make_steel(steel);
 }

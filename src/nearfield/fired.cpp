@@ -143,6 +143,18 @@ MomentFamily make_cage_family(std::vector<FreeBar> bars, int direction, double d
 
 }  // namespace
 
+ZoneInput make_partial_zone(const ZoneInput& intact, const LocalDamage& damage) {
+  ZoneInput left = intact;
+  left.concrete_loss = std::max(intact.concrete_loss, damage.transition_damage);
+  left.cover_lost = true;
+  left.length = std::min(damage.destroyed_length, kLongestZoneShare * calc_largest_zone_length(intact.concrete));
+  left.cut_concrete = 1 - (1 - intact.cut_concrete) * damage.residual_concrete;
+  left.cut_bars = 1 - (1 - intact.cut_bars) * damage.residual_bars;
+  left.section.tie_spacing = 0;
+  left.free_bars = 2 * damage.destroyed_length;  // they buckle over all of it, as those of the cage
+  return left;
+}
+
 FiredZone make_fired_zone(const ZoneInput& intact, const LocalDamage& damage) {
   const auto is_share = [](double v) { return v >= 0 && v <= 1; };
   if (!is_share(damage.transition_damage) || !is_share(damage.residual_concrete))
@@ -172,14 +184,7 @@ FiredZone make_fired_zone(const ZoneInput& intact, const LocalDamage& damage) {
   beside.length = std::min(std::max(s.width, s.height), kLongestZoneShare * calc_largest_zone_length(intact.concrete));
   out.transition = make_rcc(beside);
 
-  if (damage.residual_concrete > 0) {
-    ZoneInput left = beside;
-    left.length = std::min(h, kLongestZoneShare * calc_largest_zone_length(intact.concrete));
-    left.cut_concrete = 1 - (1 - intact.cut_concrete) * damage.residual_concrete;
-    left.cut_bars = 1 - share;
-    left.section.tie_spacing = 0;
-    out.partial = make_rcc(left);
-  }
+  if (damage.residual_concrete > 0) out.partial = make_rcc(make_partial_zone(intact, damage));
   return out;
 }
 

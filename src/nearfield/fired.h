@@ -24,6 +24,10 @@ struct FiredZone {
   std::optional<Rcc> partial;  // not fully destroyed: what is left of concrete and bars, without ties and cover
 };
 
+/// The destroyed length where some concrete is left standing: a section without ties and cover, as long as it, of the
+/// concrete's strength beside the charge. The concrete's softening limits its length as that of every zone.
+ZoneInput make_partial_zone(const ZoneInput& intact, const LocalDamage&);
+
 /// Throws InputError: as make_rcc and make_residual_cage; shares outside 0..1.
 FiredZone make_fired_zone(const ZoneInput& intact, const LocalDamage&);
 

@@ -34,6 +34,7 @@ struct ZoneInput {
   double cut_concrete = 0;   // fraction of the area taken out before, of the flange's too
   double concrete_loss = 0;  // strength lost in the transition zone beside a charge, 0..1
   bool cover_lost = false;
+  double free_bars = 0;  // length over which bars are free, clamped at its ends; 0: as the ties leave them [m]
 };
 
 /// One axis and one direction of bending: moments against the zone's rotation for each normal force. K forces, J

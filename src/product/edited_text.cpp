@@ -106,8 +106,9 @@ class Editor {
   };
   static bool is_alike(const Charge& a, const Charge& b) {
     return a.position == b.position && a.destroyed_length == b.destroyed_length && a.residual_bars == b.residual_bars &&
-           a.transition_damage == b.transition_damage && a.delay == b.delay && a.scatter == b.scatter &&
-           a.fails == b.fails && a.azimuth == b.azimuth && a.opening == b.opening;
+           a.residual_concrete == b.residual_concrete && a.transition_damage == b.transition_damage &&
+           a.delay == b.delay && a.scatter == b.scatter && a.fails == b.fails && a.azimuth == b.azimuth &&
+           a.opening == b.opening;
   }
   bool is_as_it_was(const std::pair<int, int>& place, const Charge& now) const {
     for (const Stage& s : before_.stages)
@@ -157,6 +158,7 @@ class Editor {
       out +=
           fmt::format("\n[[stage.charge]]\nmembers = [{}]\nposition = {}\ndestroyed_length = {}\nresidual_bars = {}\n",
                       members, quantity(c.position, "m"), quantity(c.destroyed_length, "m"), c.residual_bars);
+      if (c.residual_concrete > 0) out += fmt::format("residual_concrete = {}\n", c.residual_concrete);
       if (c.transition_damage > 0) out += fmt::format("transition_damage = {}\n", c.transition_damage);
       if (c.delay > 0) out += fmt::format("delay = {}\n", quantity(c.delay, "s"));
       if (c.scatter > 0) out += fmt::format("scatter = {}\n", quantity(c.scatter, "s"));

@@ -149,6 +149,7 @@ struct Charge {
   double position = 0;           // centre of the destroyed length, from the member's start [m]
   double destroyed_length = 0;   // h_d [m]
   double residual_bars = 0;      // fraction of the bars left standing, 0..1
+  double residual_concrete = 0;  // fraction of the concrete left standing; 0: the charge destroys all of it
   double transition_damage = 0;  // loss of concrete strength in the zones next to the destroyed length, 0..1
   double delay = 0;              // after the stage's time [s]
   double scatter = 0;            // standard deviation of the firing time [s]
@@ -158,6 +159,11 @@ struct Charge {
   double opening = 0;  // its angle, 2 pi: all around [rad]
   SourcePosition where;
 };
+
+/// Whether a charge on it may leave part of the concrete (Charge::residual_concrete): its end has a zone of its own.
+inline bool can_keep_concrete(const Member& m) {
+  return (m.kind == MemberKind::Column && m.storey == 0) || (m.kind == MemberKind::Beam && m.row_a != m.row_b);
+}
 
 struct Stage {
   std::string name;

@@ -22,6 +22,7 @@ inline constexpr double footprint = 0.01;  // at least [m²]
 // of [analysis], and of what a command line puts in their place
 inline constexpr Range duration{0.01, 600}, step{1e-7, 0.01}, frame_rate{1, 1000};
 inline constexpr Range destroyed_length{0.01, 100};
+inline constexpr Range residual_concrete{0, 0.95};
 inline constexpr Range cable_stiffness{0, 1e12, true}, cable_pretension{0, 1e9};
 
 }  // namespace topple::product::limits

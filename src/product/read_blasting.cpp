@@ -36,6 +36,7 @@ ChargeTable read_charge(TableReader& table) {
   c.charge.position = table.quantity("position", Dimension::Length, {0, 1000});
   c.charge.destroyed_length = table.quantity("destroyed_length", Dimension::Length, limits::destroyed_length);
   c.charge.residual_bars = table.quantity("residual_bars", Dimension::Number, fraction, 0);
+  c.charge.residual_concrete = table.quantity("residual_concrete", Dimension::Number, limits::residual_concrete, 0);
   c.charge.transition_damage = table.quantity("transition_damage", Dimension::Number, fraction, 0);
   const Sector sector = read_sector(table);
   c.charge.azimuth = sector.azimuth, c.charge.opening = sector.opening;
@@ -64,6 +65,13 @@ class Blasting {
                       "charges fire in columns, beams and shafts; take walls out under [preparation]");
         continue;
       }
+      if (charge.residual_concrete > 0 && !can_keep_concrete(m)) {
+        if (!std::exchange(is_misplaced, true))
+          table.error("E307", table.place_of("residual_concrete"),
+                      m.name + " is neither a column of the ground storey nor a beam along x",
+                      "what a charge leaves of the concrete is known of these; leave it out, or say `fails = true`");
+        continue;
+      }
       if (!is_misplaced && !check_sector(table, m)) is_misplaced = true;
       if (m.removed && !std::exchange(is_removed, true))
         table.error("E403", table.place_of("members"), m.name + " is taken out in the preparation",
@@ -74,6 +82,12 @@ class Blasting {
                     "the destroyed length, " + in_metres(low) + " to " + in_metres(high) + ", reaches out of " + m.name,
                     "it is " + in_metres(calc_length(m)) + " long; position is the middle of the destroyed length");
       for (const Fired& other : fired_[static_cast<size_t>(index)]) {
+        if ((charge.residual_concrete > 0 || other.keeps_concrete) && !is_overlapping) {
+          is_overlapping = true;
+          table.error("E404", table.place_of("members"), m.name + " has another charge, and one leaves concrete",
+                      "a charge with residual_concrete is the only one of its member");
+          continue;
+        }
         if (!(low < other.high - round_off && other.low < high - round_off) || is_overlapping) continue;
         const double apart = std::abs(std::remainder(other.azimuth - charge.azimuth, 2 * pi));
         const double least = 0.5 * (other.opening + charge.opening);
@@ -90,7 +104,8 @@ class Blasting {
         table.error("E404", table.place_of("members"), m.name + " has another charge on the same length",
                     "leave one of them out, or move them apart");
       }
-      fired_[static_cast<size_t>(index)].push_back({low, high, charge.azimuth, charge.opening});
+      fired_[static_cast<size_t>(index)].push_back(
+          {low, high, charge.azimuth, charge.opening, charge.residual_concrete > 0});
       if (++count_ > most_charges) {
         if (count_ == most_charges + 1)
           table.error("E209", from.place, "more than " + std::to_string(most_charges) + " charges");
@@ -108,6 +123,7 @@ class Blasting {
  private:
   struct Fired {
     double low = 0, high = 0, azimuth = 0, opening = 0;
+    bool keeps_concrete = false;
   };
   Reading& reading_;
   std::vector<std::vector<Fired>> fired_;  // destroyed lengths of each member

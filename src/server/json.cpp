@@ -142,6 +142,7 @@ Json describe_branch(const collapse::Steering& s, const Branch& b, const std::st
                        {"position", p.position},
                        {"destroyed_length", p.destroyed_length},
                        {"residual_bars", p.residual_bars},
+                       {"residual_concrete", p.residual_concrete},
                        {"time", c.time},
                        {"fired", collapse::LiveModel::has_fired(c, now)},
                        {"fails", c.fails},

@@ -82,6 +82,55 @@ TEST(LiveModel, ForgetsStubsThatChargesTakenOutWouldHaveLeft) {
   EXPECT_EQ(differ, 1);
 }
 
+TEST(LiveModel, AddsChargesThatLeaveConcrete) {
+  const product::Plan plan = staged();
+  const std::string add =
+      R"({"command": "add_charge", "member": "B-A1B1-1", "position": 1.2, "destroyed_length": 0.8, )"
+      R"("residual_concrete": 0.25, "time": 0.7})";
+  const LiveModel live = edited(plan, {{0.1, add}});
+  EXPECT_EQ(live.charge(live.charges().back()).residual_concrete, 0.25);
+  EXPECT_EQ(live.map().events.back().kept, 0.25);
+  EXPECT_EQ(live.map().events.back().debris_mass, 0);
+  const BranchPlan b = write_branch_plan(live);
+  EXPECT_THAT(b.text, HasSubstr("residual_concrete = 0.25\n"));
+  expect_same_firings(live, LiveModel(read(b.text), default_knowledge(), 1), 7e-3);
+  const auto refused = [&](const std::string& command, const std::string& why) {
+    try {
+      (void)edited(plan, {{0.1, command}});
+      ADD_FAILURE() << command;
+    } catch (const InputError& e) { EXPECT_THAT(e.what(), HasSubstr(why)); }
+  };
+  const auto on = [](const std::string& member, double concrete) {
+    return fmt::format(R"({{"command": "add_charge", "member": "{}", "position": 1.2, "destroyed_length": 0.6, )"
+                       R"("residual_concrete": {}}})",
+                       member, concrete);
+  };
+  refused(on("C-B1-1", 0.2), "columns of the ground storey");
+  refused(on("B-A1B1-1", 0.96), "0 to 0.95");
+  refused(on("C-B1-0", 0.2), "one leaves concrete");
+}
+
+TEST(LiveModel, FiresAFailingChargeWithTheDamageBesideIt) {
+  const std::string more = "transition_damage = 0.4\n", fails = more + "fails = true\n";
+  const auto beam = [](const std::string& rest) {
+    return read(
+        house("[[stage]]\nname = \"s\"\ntime = \"0.2 s\"\n[[stage.charge]]\nmembers = \"B-A1B1-1\"\n"
+              "position = \"2.4 m\"\ndestroyed_length = \"4 m\"\n" +
+              rest + charge("C-A*-0", "0.4 s")));
+  };
+  const LiveModel live = edited(beam(fails), {{0.1, R"({"command": "fire", "charge": 0})"}});
+  const LiveModel planned(beam(more), default_knowledge(), 1);
+  const auto switches = [](const LiveModel& m) {
+    std::vector<std::pair<int, double>> out;
+    for (const mbs::Action& a : m.model().events.front().actions)
+      if (a.kind == mbs::Action::Kind::SwitchLaw)
+        out.emplace_back(a.element.index, m.model().laws[static_cast<size_t>(a.law.index)].compression.f[0]);
+    return out;
+  };
+  EXPECT_EQ(switches(planned).size(), 2u);
+  EXPECT_EQ(switches(live), switches(planned));
+}
+
 TEST(BranchPlan, FiresWhatTheBranchFires) {
   // both scatter by 1 ms and by three of them at most
   constexpr double scatter = 7e-3;

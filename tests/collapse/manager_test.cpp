@@ -14,6 +14,7 @@
 #include "collapse/run.h"
 #include "mbs/solver.h"
 #include "mbs/zone_law.h"
+#include "nearfield/fired.h"
 #include "plans.h"
 
 namespace topple::collapse {
@@ -480,6 +481,22 @@ TEST(ManagerPhysics, ColumnsWhoseBarsHoldAfterTheirChargesGoOnStanding) {
   }
 }
 
+TEST(ManagerPhysics, WhatAChargeLeavesOfTheConcreteBearsOrIsCrushed) {
+  // columns of the front row bear 0.1 MN each
+  const auto run = [](double concrete) {
+    const std::string kept = fmt::format("residual_concrete = {}\n", concrete);
+    const record::Record r = run_plan(read(house(charge("C-A*-0", "0.1 s", kept), "1 s")), default_knowledge(), {}, {});
+    const auto energy = std::find_if(r.findings.begin(), r.findings.end(),
+                                     [](const record::Finding& f) { return f.id == "verification.energy"; });
+    EXPECT_TRUE(energy != r.findings.end() && energy->status == record::Status::Good);
+    const auto said = std::find_if(r.findings.begin(), r.findings.end(),
+                                   [](const record::Finding& f) { return f.id == "mechanism"; });
+    return said == r.findings.end() ? std::string() : said->text;
+  };
+  EXPECT_THAT(run(0.5), testing::StartsWith("The building stands"));
+  EXPECT_THAT(run(0.02), testing::Not(testing::StartsWith("The building stands")));
+}
+
 TEST(ManagerPhysics, AStubIsCrushedByWhatComesDownOnIt) {
   // the house tilts over row A, whose stubs of 1 m reach the ground at 0.71 s: they do not prop it up
   const product::Plan plan = read(house(charge("C-A*-0", "0.1 s"), "1.2 s"));
@@ -547,6 +564,41 @@ TEST(Manager, AFailingChargeDoesNothing) {
   EXPECT_EQ(b.model.events.size(), 2u);  // one charge and what it throws out
   EXPECT_EQ(b.map.schedule.size(), 2u);
   EXPECT_EQ(b.map.events[0].member, "C-B1-0");
+}
+
+TEST(Manager, AChargeThatLeavesConcreteThrowsNothingOut) {
+  const std::string partly = "residual_concrete = 0.3\ntransition_damage = 0.2\n";
+  const Built b = build(read(portal(charge("C-A1-0", "0 s", partly))));
+  ASSERT_EQ(b.model.events.size(), 1u);
+  EXPECT_EQ(b.map.events[0].debris_mass, 0);
+  EXPECT_EQ(b.map.events[0].kept, 0.3);
+  EXPECT_TRUE(b.map.debris.empty());
+  EXPECT_TRUE(b.map.stubs.empty());
+  ASSERT_EQ(b.model.events[0].actions.size(), 1u);
+  const mbs::Action& act = b.model.events[0].actions[0];
+  ASSERT_EQ(act.kind, mbs::Action::Kind::SwitchLaw);
+  EXPECT_EQ(act.stiffness_share, 1);
+  const mbs::ZoneElement& foot = b.model.elements[static_cast<size_t>(act.element.index)];
+  EXPECT_EQ(foot.name, "C-A1-0/foot");
+  const mbs::ZoneLaw &now = b.model.laws[static_cast<size_t>(act.law.index)],
+                     &before = b.model.laws[static_cast<size_t>(foot.stations[0].law.index)];
+  // what is left of 1 m of the column, until it is crushed through; then the column as it was, from its elastic limit
+  const product::Plan plan = read(portal());
+  nearfield::ZoneInput intact;
+  intact.section = plan.sections[0], intact.concrete = plan.concretes[0], intact.steel = plan.steels[0];
+  const nearfield::Rcc left = nearfield::make_rcc(nearfield::make_partial_zone(intact, {1, 0.1, 0.2, 0.3}));
+  const auto peak = [](const std::vector<double>& f) { return *std::max_element(f.begin(), f.end()); };
+  const mbs::Curve& c = now.compression;
+  const size_t end = static_cast<size_t>(std::find(c.x.begin(), c.x.end(), 1.0) - c.x.begin());
+  ASSERT_LT(end + 1, c.x.size());
+  EXPECT_EQ(*std::max_element(c.f.begin(), c.f.begin() + static_cast<std::ptrdiff_t>(end)),
+            peak(left.compression.force));
+  EXPECT_LT(peak(left.compression.force), 0.3 * peak(before.compression.f));
+  EXPECT_EQ(c.f[end + 1], before.compression.f[0]);
+  EXPECT_EQ(peak(c.f), peak(before.compression.f));
+  EXPECT_NEAR(now.crush_length, 1.05 + before.crush_length, 1e-12);
+  EXPECT_EQ(now.moment_y.normal_force.front(), left.y_pos.normal_force.front());
+  EXPECT_LT(peak(now.moment_y.positive), 0.5 * peak(before.moment_y.positive));
 }
 
 /// One stage of the portal, whose columns are 2.5 m high in the clear, with such charges.

@@ -178,6 +178,20 @@ TEST(Grid, RefusesASizeWithMoreCellsThanItCanNumber) {
   }
 }
 
+TEST(Grid, RefusesChargesThatLeaveConcrete) {
+  const auto code = [](const std::string& more) -> std::string {
+    try {
+      (void)make(read(portal(charge("C-A1-0", "0 s", "residual_concrete = 0.2\n" + more))), 0.2);
+    } catch (const InputError& e) {
+      EXPECT_GT(e.diagnostics()[0].where.line, 0);
+      return e.diagnostics()[0].code;
+    }
+    return "";
+  };
+  EXPECT_EQ(code(""), "E675");
+  EXPECT_EQ(code("fails = true\n"), "");
+}
+
 TEST(Grid, RefusesMembersWithoutRoomWithTheirLine) {
   // rows so near that the beam between them lies inside the columns
   const std::string text = materials() + grid("A = \"0 m\", B = \"0.3 m\"", "1 = \"0 m\"", 2) +

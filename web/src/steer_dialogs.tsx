@@ -122,6 +122,7 @@ function Content(props: { s: SteerState; dialog: Dialog }) {
             { key: "position", label: "Position", unit: "m", value: "1.1", help: "middle of the destroyed length, from the member's start" },
             { key: "destroyed_length", label: "Destroyed length", unit: "m", value: "1.5" },
             { key: "residual_bars", label: "Bars that stay", unit: "%", factor: 0.01, value: "10" },
+            { key: "residual_concrete", label: "Concrete that stays", unit: "%", factor: 0.01, value: "0", help: "0: all of it is thrown out" },
             { key: "transition_damage", label: "Damage beside it", unit: "%", factor: 0.01, value: "20" },
             { key: "time", label: "Fires at", unit: "s", value: "", optional: true, help: "empty: now" },
           ]}

@@ -14,6 +14,7 @@ export interface Charge {
   position: number;
   destroyed_length: number;
   residual_bars: number;
+  residual_concrete: number;
   time: number;
   fired: boolean;
   fails: boolean;
