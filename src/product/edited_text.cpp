@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <numbers>
 #include <set>
+#include <tuple>
 
 #include "base/utf8.h"
 #include "product/document.h"
@@ -269,12 +271,65 @@ class Editor {
   std::set<int> heads_;
 };
 
+/// Of each charge of a stage the number of its table, from 0.
+std::vector<int> number_tables(const Stage& stage) {
+  std::map<std::pair<int, int>, int> numbers;  // by place; places rise with their numbers
+  for (const Charge& c : stage.charges) numbers[{c.where.line, c.where.column}] = 0;
+  int next = 0;
+  for (auto& entry : numbers) entry.second = next++;
+  std::vector<int> out;
+  for (const Charge& c : stage.charges) out.push_back(numbers[{c.where.line, c.where.column}]);
+  return out;
+}
+
+/// What fuzzy values vary of charges they go on varying: one that has got a table of its own has a number of its own.
+void check_fuzzy_charges(const Plan& before, const Plan& after) {
+  using Key = std::tuple<int, int, std::string>;  // stage, number of the table, and what is varied of it
+  const auto key_of = [](const DocumentPath& p, int stage, int number) {
+    std::string rest;
+    for (size_t i = 4; i < p.size(); ++i) rest += fmt::format("{} {}.", p[i].key, p[i].item);
+    return Key{stage, number, rest};
+  };
+  const auto is_of_charge = [](const DocumentPath& p) {
+    return p.size() > 4 && p[0].key == "stage" && p[2].key == "charge";
+  };
+  std::vector<std::vector<int>> old_numbers, new_numbers;
+  for (const Stage& s : before.stages) old_numbers.push_back(number_tables(s));
+  for (const Stage& s : after.stages) new_numbers.push_back(number_tables(s));
+  for (size_t i = 0; i < before.fuzzy.places.size(); ++i) {
+    std::set<Key> varied;
+    for (const DocumentPath& p : after.fuzzy.places[i])
+      if (is_of_charge(p)) varied.insert(key_of(p, p[1].item, p[3].item));
+    for (const DocumentPath& p : before.fuzzy.places[i]) {
+      if (!is_of_charge(p)) continue;
+      const size_t s = static_cast<size_t>(p[1].item);
+      for (size_t c = 0; c < before.stages[s].charges.size(); ++c) {
+        if (old_numbers[s][c] != p[3].item) continue;
+        const Charge& old = before.stages[s].charges[c];
+        for (size_t t = 0; t < after.stages.size(); ++t)
+          for (size_t d = 0; d < after.stages[t].charges.size(); ++d) {
+            const Charge& now = after.stages[t].charges[d];
+            if (now.member != old.member || now.fails || std::abs(now.position - old.position) > 1e-9) continue;
+            // a delay that has been set is meant
+            if (p.back().key == "delay" && now.delay != old.delay) continue;
+            if (!varied.contains(key_of(p, static_cast<int>(t), new_numbers[t][d])))
+              refuse(
+                  fmt::format("[fuzzy] varies the charge on {} together with others by their number; a path with "
+                              "\"*\" would go on doing so",
+                              before.members[static_cast<size_t>(old.member)].name));
+          }
+      }
+    }
+  }
+}
+
 }  // namespace
 
 std::string write_changes(const Plan& plan, const PlanChanges& changes) {
   std::string text = Editor(plan, changes).run();
   std::vector<Diagnostic> warnings;
-  (void)read_plan(text, plan.path, warnings);
+  const Plan before = read_plan(plan.text, plan.path, warnings), after = read_plan(text, plan.path, warnings);
+  check_fuzzy_charges(before, after);
   return text;
 }
 

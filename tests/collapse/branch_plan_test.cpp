@@ -259,6 +259,31 @@ TEST(BranchPlan, KeepsWhatFuzzyPathsName) {
   EXPECT_EQ(before.text, plan.text);
 }
 
+TEST(BranchPlan, KeepsChargesVariedThatFuzzyPathsName) {
+  const auto with = [](const std::string& path) {
+    return staged("[fuzzy]\n" + path + " = { triangular = [0, 0.1, 1] }\n");
+  };
+  // one of three columns fires later, so it stands in a table of its own, which the number does not name
+  const std::pair<double, std::string> edit{0, R"({"command": "set_delay", "charge": 1, "delay": 0.01})"};
+  const product::Plan numbered = with("stage.1.charge.1.residual_bars");
+  const BranchPlan refused = write_branch_plan(edited(numbered, {edit}));
+  EXPECT_TRUE(refused.taken.empty());
+  ASSERT_EQ(refused.left_out.size(), 1U);
+  EXPECT_THAT(refused.left_out[0], HasSubstr("[fuzzy] varies the charge on C-A2-0 together with others"));
+  EXPECT_EQ(refused.text, numbered.text);
+  // a pattern names it
+  const BranchPlan b = write_branch_plan(edited(with(R"(stage.1.charge."*".residual_bars)"), {edit}));
+  ASSERT_TRUE(b.left_out.empty()) << b.left_out.front();
+  EXPECT_EQ(read(b.text).fuzzy.places.front().size(), 2U);
+  // of another stage, all of a table alike, and one that fails from now on
+  for (const char* other :
+       {R"({"command": "set_delay", "charge": 4, "delay": 0.01})",
+        R"({"command": "set_delay", "stage": 0, "time": 0.3})", R"({"command": "remove_charge", "charge": 1})"}) {
+    const BranchPlan kept = write_branch_plan(edited(numbered, {{0, other}}));
+    EXPECT_TRUE(kept.left_out.empty()) << other << kept.left_out.front();
+  }
+}
+
 TEST(BranchPlan, KeepsNumbersOfChargesThatFuzzyPathsName) {
   const std::string fuzzy = "[fuzzy]\nstage.2.charge.1.delay = { triangular = [\"0 ms\", \"0 ms\", \"30 ms\"] }\n";
   const product::Plan plan = staged(fuzzy);
