@@ -8,10 +8,12 @@
 #include <optional>
 #include <set>
 #include <string_view>
+#include <tuple>
 
 #include "base/error.h"
 #include "base/unit.h"
 #include "product/clip.h"
+#include "product/ifc_angle.h"
 #include "product/ifc_kinds.h"
 
 namespace topple::product {
@@ -21,13 +23,14 @@ namespace {
 using Kind = StepValue::Kind;
 
 /// Of its box, what the volume of a mesh has to fill to be taken for it. Walls have openings.
-constexpr double kFilled = 0.9, kFilledWall = 0.5;
-constexpr double kLine = 0.3;           // columns less far apart stand in one line [m]
-constexpr double kFarthest = 1e8;       // coordinate of an element [m]
-constexpr double kNear = 1e-3;          // what a boundary has to lie around may stand out as far [m]
-constexpr double kStraight = 0.8;       // distance of a bar's ends over its length; ties are bent round
-constexpr int kMostItems = 10000;       // of a body or a bar, maps within maps counted each time
-constexpr size_t kMostPoints = 100000;  // of a composite curve, likewise
+constexpr double kFilled = 0.9, kFilledWall = 0.5, kOverfilled = 1.02;
+constexpr double kPlate = 0.8;           // of a slab's volume, at least in the plate of its parts
+constexpr double kLargestCircle = 1.06;  // around a round mesh, over its box: of a polygon with 10 corners at most
+constexpr double kFarthest = 1e8;        // coordinate of an element [m]
+constexpr double kNear = 1e-3;           // what a boundary has to lie around may stand out as far [m]
+constexpr double kStraight = 0.8;        // distance of a bar's ends over its length; ties are bent round
+constexpr int kMostItems = 10000;        // of a body or a bar, maps within maps counted each time
+constexpr size_t kMostPoints = 100000;   // of a composite curve, likewise
 constexpr const char* kTooMany = "its body has more than 10,000 items";
 
 /// What a body is made of. Points in world axes [m].
@@ -244,14 +247,15 @@ class Reader {
   /// storeys at one height, their elevations.
   void read_storeys() {
     double low = 1e30, high = -1e30;
+    int placed = 0;
     const auto storeys = file_.of_type("IFCBUILDINGSTOREY");
     for (const StepEntity* s : storeys)
-      if (const auto X = find_placement(s->at(5))) low = std::min(low, X->p.z), high = std::max(high, X->p.z);
+      if (const auto X = find_placement(s->at(5))) ++placed, low = std::min(low, X->p.z), high = std::max(high, X->p.z);
     const double ground = low <= high ? low : 0;
     for (const StepEntity* s : storeys) {
       const auto X = find_placement(s->at(5));
       const bool has_elevation = s->at(9).kind == Kind::Number;
-      if (X && (high - low > 1e-3 || !has_elevation)) {
+      if (X && (placed == 1 || high - low > 1e-3 || !has_elevation)) {
         out_.storeys.emplace_back(s->at(2).text, X->p.z);
       } else if (has_elevation) {
         out_.storeys.emplace_back(s->at(2).text, ground + s->at(9).number * out_.length_unit);
@@ -761,8 +765,12 @@ class Reader {
       e.is_round =
           e.type == "IFCCOLUMN" && std::abs(size.x - size.y) < 0.02 * size.x && std::abs(filled - round) < 0.04;
       if (e.is_round) e.diameter = find_diameter(body, 0.5 * (e.low + e.high));
-      e.has_box = e.is_round || filled >= (e.type == "IFCWALL" ? kFilledWall : kFilled);
-      if (!e.has_box) e.why = "its body is a mesh that is no upright box";
+      // corners of L, T and hollow shapes that fill as much of their box lie up to 1.41 of its half away
+      e.is_round = e.is_round && e.diameter < kLargestCircle * size.x;
+      e.has_box = filled < kOverfilled && (e.is_round || filled >= (e.type == "IFCWALL" ? kFilledWall : kFilled));
+      if (!e.has_box)
+        e.why = filled < kOverfilled ? "its body is a mesh that is no upright box"
+                                     : "its body is a mesh that overlaps itself, or is not closed";
       if (e.has_box && e.type == "IFCWALL" && !lies_flat(body, e)) {
         e.has_box = false;
         e.why = "it is turned against the grid, or inclined";
@@ -781,12 +789,21 @@ class Reader {
     if (e.is_round) e.diameter = find_diameter(body, 0.5 * (e.low + e.high));
     const bool is_panel = e.type == "IFCWALL" || e.type == "IFCSLAB";
     if (e.type == "IFCSLAB") find_outlines(body, e);
+    if (e.type == "IFCWALL") e.filled = filled;
     if (!(is_panel ? lies_flat(body, e) : filled >= kFilled * (e.is_round ? round : 1))) {
       e.why = is_stretched ? "its profile is round, but as wide as high it is not"
                            : "it is turned against the grid, or inclined";
-      if (!is_panel && !e.is_round && lies_along_axes(body)) e.why = "its profile does not fill its box";
+      // an upright rectangle is turned
+      const bool is_shape = std::any_of(body.shape.solids.begin(), body.shape.solids.end(), [](const Solid& solid) {
+        return std::hypot(solid.way.x, solid.way.y) < 1e-3 * std::abs(solid.way.z) &&
+               (solid.loops.size() > 1 || solid.loops.front().size() > 5);
+      });
+      if (!is_panel && !is_stretched && ((is_column && is_shape) || (!e.is_round && lies_along_axes(body))))
+        e.why = "its profile does not fill its box";
     } else if (is_panel && e.outlines.empty() && !(filled >= (e.type == "IFCWALL" ? kFilledWall : kFilled))) {
       e.why = "its profile does not fill its box";
+    } else if (e.plate < kPlate) {
+      e.why = "its parts have several thicknesses, or lie at several heights";
     } else {
       e.has_box = true;
     }
@@ -917,17 +934,32 @@ class Reader {
       }
     return along >= kFilled * all;
   }
-  /// Outlines of a slab whose solids are upright.
+  /// Outlines of a slab whose solids are upright. It is a plate, which ribs, kerbs and drop panels stand on or hang
+  /// from: what has the height of the solid that covers most.
   void find_outlines(const Body& body, IfcElement& e) const {
     if (!body.points.empty()) return;
     for (const Solid& solid : body.shape.solids)
       if (std::hypot(solid.way.x, solid.way.y) > 1e-3 * std::abs(solid.way.z)) return;
+    const auto range = [](const Solid& solid) {
+      const double z = solid.loops.front().front().z;
+      return std::minmax({z, z + solid.way.z});
+    };
+    double low = 0, high = 0, most = 0, all = 0, plate = 0;
+    for (const Solid& solid : body.shape.solids)
+      if (const double area = solid.volume() / std::abs(solid.way.z); area > most)
+        most = area, std::tie(low, high) = range(solid);
     for (const Solid& solid : body.shape.solids) {
+      all += solid.volume();
+      const auto [bottom, top] = range(solid);
+      if (std::abs(bottom - low) > kNear || std::abs(top - high) > kNear) continue;
+      plate += solid.volume();
       std::vector<Loop> loops = solid.loops;
       for (Loop& loop : loops)
         for (Vec3& p : loop) p = turn(p);
       e.outlines.push_back(std::move(loops));
     }
+    e.plate = plate / all;
+    if (e.plate >= kPlate) e.low.z = low, e.high.z = high;
   }
 
   IfcMaterial material_of(int id) const {
@@ -937,13 +969,12 @@ class Reader {
     return {};
   }
 
-  /// Of the directions of the building's edges, modulo a right angle, the one along which its columns stand in the
-  /// fewest rows and frames: what stands askew beside them does not turn it. Else that of most edges, by their length.
+  /// Of the edges of all bodies and the middles of columns.
   void find_angle(const std::vector<Body>& bodies) {
-    std::vector<Edge> edges;
+    std::vector<Vec3> edges;
     const auto add = [&](const Vec3& d) {
-      const double length = std::hypot(d.x, d.y), a = std::atan2(d.y, d.x);
-      if (length > 1e-6 && length < kFarthest) edges.push_back({a - kRight * std::floor(a / kRight), length});
+      const double length = std::hypot(d.x, d.y);
+      if (length > 1e-6 && length < kFarthest) edges.push_back(d);
     };
     std::vector<Vec3> columns;
     for (size_t b = 0; b < bodies.size(); ++b) {
@@ -964,59 +995,7 @@ class Reader {
           std::hypot(sum.x, sum.y) < kFarthest * static_cast<double>(n))
         columns.push_back((1.0 / static_cast<double>(n)) * sum);
     }
-    std::sort(edges.begin(), edges.end());
-    Alignment best;
-    for (int i = 0; i < 12 && !edges.empty(); ++i) {
-      const double angle = take_direction(edges);
-      const Alignment found = align(columns, angle);
-      if (i > 0 && (found.lines > best.lines || (found.lines == best.lines && found.spread > best.spread - 1e-3)))
-        continue;
-      best = found;
-      out_.angle = std::abs(angle) < 1e-4 ? 0 : angle;
-    }
-  }
-  static constexpr double kRight = 90 * unit::deg;
-  struct Edge {
-    double angle = 0, length = 0;  // angle from 0 to kRight
-    bool operator<(const Edge& o) const { return angle < o.angle; }
-  };
-  /// The median of the degree that holds the longest edges; they are taken out. Edges are sorted.
-  static double take_direction(std::vector<Edge>& edges) {
-    constexpr double width = 1 * unit::deg;
-    const size_t n = edges.size();
-    const auto at = [&](size_t i) { return edges[i % n].angle + (i < n ? 0 : kRight); };
-    size_t from = 0, to = 0;
-    double most = 0, held = 0;
-    for (size_t i = 0, end = 0; i < n; held -= edges[i++].length) {
-      for (; end < i + n && at(end) <= at(i) + width; ++end) held += edges[end % n].length;
-      if (held > most * (1 + 1e-9)) most = held, from = i, to = end;
-    }
-    double passed = 0, median = 0;
-    for (size_t k = from; k < to && passed < 0.5 * most; ++k) passed += edges[k % n].length, median = at(k);
-    std::erase_if(edges, [median](const Edge& e) {
-      const double off = e.angle - median;
-      return std::abs(off - kRight * std::round(off / kRight)) <= width;
-    });
-    return median - kRight * std::round(median / kRight);
-  }
-  /// Rows and frames of columns along a direction, and how far they stand off them.
-  struct Alignment {
-    int lines = 0;
-    double spread = 0;  // [m]
-  };
-  static Alignment align(const std::vector<Vec3>& columns, double angle) {
-    Alignment out;
-    const double c = std::cos(angle), s = std::sin(angle);
-    for (const bool is_x : {true, false}) {
-      std::vector<double> places;
-      for (const Vec3& p : columns) places.push_back(is_x ? c * p.x + s * p.y : c * p.y - s * p.x);
-      std::sort(places.begin(), places.end());
-      for (size_t i = 0, first = 0; i < places.size(); ++i) {
-        if (i == 0 || places[i] - places[first] >= kLine) first = i, ++out.lines;
-        out.spread += places[i] - places[first];
-      }
-    }
-    return out;
+    out_.angle = find_grid_angle(edges, columns);
   }
   Vec3 turn(const Vec3& p) const {
     const double c = std::cos(out_.angle), s = std::sin(out_.angle);

@@ -29,7 +29,9 @@ struct IfcElement {
   bool has_opening = false;
   int openings_not_read = 0;  // of a wall: those whose body is no upright box
   std::string why;
-  Vec3 low, high;  // box [m]
+  Vec3 low, high;     // box, of a slab its plate's [m]
+  double filled = 1;  // of a wall: share of its box
+  double plate = 1;   // of a slab: share of its volume that its plate has, without ribs, kerbs and drop panels
   // of upright slabs, outline and holes of each of its parts; none: its box [m]
   std::vector<std::vector<std::vector<Vec3>>> outlines;
   std::vector<std::pair<Vec3, Vec3>> openings;  // of a wall: lowest and highest corners of their boxes [m]

@@ -163,6 +163,18 @@ class Planner {
     const double whole = whole_thickness(e);
     return has_layers(e) && e.layers - e.carrying > 1e-3 ? std::min(e.carrying, whole) : whole;
   }
+  /// How many elements have less than `enough` of something, and the one that has least.
+  static std::pair<int, const IfcElement*> find_least(const std::vector<Group>& groups, double IfcElement::*share,
+                                                      double enough) {
+    std::pair<int, const IfcElement*> out{0, nullptr};
+    for (const Group& g : groups)
+      for (const IfcElement* e : g.elements) {
+        if (e->*share >= enough) continue;
+        ++out.first;
+        if (out.second == nullptr || e->*share < out.second->*share) out.second = e;
+      }
+    return out;
+  }
   void tell_layers(const std::vector<Group>& groups, const char* kind) {
     struct Kind {
       int layered = 0, whole = 0;
@@ -598,6 +610,11 @@ class Planner {
       tell_placed(placed, "slab", slabs_.size(), "thickness");
       tell_floors(claims, "slabs");
       tell_layers(slabs_, "slab");
+      if (const auto [number, least] = find_least(slabs_, &IfcElement::plate, 1 - 1e-6); number > 0)
+        guessed(
+            fmt::format("{} of several parts: the plate was taken, {:.0f} % of the volume at least (#{}), without "
+                        "ribs, kerbs and drop panels",
+                        count_words(number, "slab"), 100 * least->plate, least->id));
       int opened = 0;
       for (const Group& g : slabs_)
         for (const IfcElement* e : g.elements) opened += e->has_opening;
@@ -635,6 +652,11 @@ class Planner {
       tell_placed(placed, "wall", walls_.size(), "thickness");
       tell_edges(claims, "wall", true);
       tell_layers(walls_, "wall");
+      if (const auto [number, least] = find_least(walls_, &IfcElement::filled, 0.9); number > 0)
+        guessed(
+            fmt::format("{} {} only a part of the box around, {:.0f} % at least (#{}): openings and recesses in an "
+                        "outline are not seen, the box was taken",
+                        count_words(number, "wall"), number == 1 ? "fills" : "fill", 100 * least->filled, least->id));
       place_openings(claims);
     }
   }

@@ -60,21 +60,27 @@ class Parser {
       fail("is no STEP file: it does not begin with ISO-10303-21", "give an IFC file in STEP form (.ifc)");
     skip_statement();
     while (!read_header_statement(file)) {}
-    size_t counted = 0;
-    int line = 1, column = 1;
+    do read_section(file);
+    while (text_.compare(at_, 4, "DATA") == 0 && read_header_statement(file));
+    return file;
+  }
+
+ private:
+  /// Up to behind its end.
+  void read_section(StepFile& file) {
     for (skip(); at_ < text_.size() && text_[at_] == '#'; skip()) {
       StepEntity e;
-      for (; counted < at_; ++counted) {
-        if (text_[counted] == '\n') {
-          ++line, column = 1;
-        } else if ((static_cast<unsigned char>(text_[counted]) & 0xC0) != 0x80) {
-          ++column;
+      for (; counted_ < at_; ++counted_) {
+        if (text_[counted_] == '\n') {
+          ++line_, column_ = 1;
+        } else if ((static_cast<unsigned char>(text_[counted_]) & 0xC0) != 0x80) {
+          ++column_;
         }
       }
-      e.line = line, e.column = column;
+      e.line = line_, e.column = column_;
       e.id = read_id();
       if (const StepEntity* first = file.find(e.id)) {
-        at_ = counted;
+        at_ = counted_;
         fail("#" + std::to_string(e.id) + " is given twice, first in line " + std::to_string(first->line),
              "every entity has an id of its own");
       }
@@ -92,10 +98,11 @@ class Parser {
     if (text_.compare(at_, 6, "ENDSEC") != 0)
       fail("an entity such as #12=IFCCOLUMN(...); is wanted",
            "the data end with ENDSEC; the file may have been cut off");
-    return file;
+    at_ += 6;
+    skip();
+    if (at_ < text_.size() && peek() == ';') ++at_;
+    skip();
   }
-
- private:
   /// One statement in front of the data: what it says of the schema; true if the data begin behind it.
   bool read_header_statement(StepFile& file) {
     skip();
@@ -242,6 +249,8 @@ class Parser {
   const std::string& text_;
   const std::string& name_;
   size_t at_ = 0;
+  size_t counted_ = 0;  // up to there lines and columns are
+  int line_ = 1, column_ = 1;
 };
 
 }  // namespace

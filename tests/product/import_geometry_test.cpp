@@ -174,6 +174,141 @@ TEST(ImportIfcBoxes, GiveWayToTheOutlinesOfSlabs) {
   EXPECT_THAT(made.text, HasSubstr("at = [\"A1B2\", \"B1C2\"]"));
 }
 
+/// A prism of faces over an outline that runs against the clock.
+std::string prism(Writer& w, const std::vector<std::array<double, 2>>& outline, double height) {
+  std::vector<std::string> low, high;
+  for (const auto& c : outline) low.push_back(w.point(c[0], c[1], 0)), high.push_back(w.point(c[0], c[1], height));
+  std::vector<std::string> loops(2);
+  const size_t n = outline.size();
+  for (size_t i = 0; i < n; ++i) {
+    loops[0] += (i > 0 ? "," : "") + low[n - 1 - i], loops[1] += (i > 0 ? "," : "") + high[i];
+    const size_t next = (i + 1) % n;
+    loops.push_back(low[i] + "," + low[next] + "," + high[next] + "," + high[i]);
+  }
+  std::string faces;
+  for (const std::string& corners : loops)
+    faces +=
+        (faces.empty() ? "" : ",") +
+        w.add("IFCFACE((" + w.add("IFCFACEOUTERBOUND(" + w.add("IFCPOLYLOOP((" + corners + "))") + ",.T.)") + "))");
+  return w.add("IFCFACETEDBREP(" + w.add("IFCCLOSEDSHELL((" + faces + "))") + ")");
+}
+std::vector<std::array<double, 2>> polygon(int corners, double radius) {
+  std::vector<std::array<double, 2>> out;
+  for (int i = 0; i < corners; ++i) {
+    const double a = (i + 0.5) * 360 / corners * unit::deg;
+    out.push_back({radius * std::cos(a), radius * std::sin(a)});
+  }
+  return out;
+}
+
+TEST(ImportIfcBoxes, OfRoundMeshesHoldCirclesOnly) {
+  const auto made_of = [](const std::vector<std::array<double, 2>>& outline) {
+    Writer w;
+    w.metres();
+    add_bay(w);
+    w.element("IFCCOLUMN", w.placement("$", 10, 0, 0), w.shape("Brep", prism(w, outline, 3)));
+    return import("IFC4", w);
+  };
+  // sqrt(pi) 20 cm = 35.4 cm around a twelve-sided one
+  EXPECT_THAT(made_of(polygon(12, 0.2)).text, HasSubstr("width = \"35.4 cm\""));
+  // an angle whose legs are half as thick as wide, and a cross, fill as much of their box
+  for (const std::vector<std::array<double, 2>>& outline :
+       {std::vector<std::array<double, 2>>{{-0.2, -0.2}, {0.2, -0.2}, {0.2, 0}, {0, 0}, {0, 0.2}, {-0.2, 0.2}},
+        {{-0.107, -0.2},
+         {0.107, -0.2},
+         {0.107, -0.107},
+         {0.2, -0.107},
+         {0.2, 0.107},
+         {0.107, 0.107},
+         {0.107, 0.2},
+         {-0.107, 0.2},
+         {-0.107, 0.107},
+         {-0.2, 0.107},
+         {-0.2, -0.107},
+         {-0.107, -0.107}}}) {
+    const Import made = made_of(outline);
+    EXPECT_THAT(made.report.missing, Contains("1 x COLUMN: its body is a mesh that is no upright box"));
+    EXPECT_THAT(made.report.taken, Contains("4 columns in 1 section"));
+  }
+}
+
+TEST(ImportIfcBoxes, OfMeshesThatOverlapAreNone) {
+  Writer w;
+  w.metres();
+  add_bay(w);
+  w.element("IFCCOLUMN", w.placement("$", 10, 0, 0), w.shape("Brep", w.brep(0.4, 0.4, 3) + "," + w.brep(0.4, 0.4, 3)));
+  EXPECT_THAT(import("IFC4", w).report.missing,
+              Contains("1 x COLUMN: its body is a mesh that overlaps itself, or is not closed"));
+}
+
+TEST(ImportIfcAngle, IsNotThatOfRoundMeshes) {
+  for (const int corners : {16, 24, 36, 72}) {
+    Writer w;
+    w.metres();
+    for (const double x : {0.0, 5.0})
+      for (const double y : {0.0, 6.0})
+        w.element("IFCCOLUMN", w.placement("$", x, y, 0), w.shape("Brep", prism(w, polygon(corners, 0.2), 3)));
+    EXPECT_THAT(import("IFC4", w).text, HasSubstr("rows = { A = \"0.000 m\", B = \"5.000 m\" }")) << corners;
+  }
+}
+
+TEST(ImportIfcBoxes, OfSlabsAreThatOfTheirPlate) {
+  /// A plate of 5 m x 4 m x 20 cm with its underside at 2.8 m, and a box more.
+  const auto made_with = [](double x, double y, double z, double at) {
+    Writer w;
+    w.metres();
+    add_bay(w);
+    const auto box = [&w](double a, double b, double c, double low) {
+      return w.add("IFCEXTRUDEDAREASOLID(" + w.rectangle(a, b) + "," +
+                   w.add("IFCAXIS2PLACEMENT3D(" + w.point(2.5, 2, low) + ",$,$)") + "," +
+                   w.add("IFCDIRECTION((0.,0.,1.))") + "," + std::to_string(c) + ")");
+    };
+    w.element("IFCSLAB", w.placement("$", 0, 0, 2.8),
+              w.shape("SweptSolid", box(5, 4, 0.2, 0) + "," + box(x, y, z, at)));
+    return import("IFC4", w);
+  };
+  // a rib below, a kerb above
+  const Import rib = made_with(5, 0.3, 0.4, -0.4), kerb = made_with(5, 0.15, 0.5, 0.2);
+  for (const Import& made : {rib, kerb}) {
+    EXPECT_THAT(made.text, HasSubstr("thickness = \"20 cm\""));
+    EXPECT_THAT(made.report.guessed, Contains(HasSubstr("1 slab of several parts: the plate was taken, ")));
+    EXPECT_THAT(made.report.guessed, Not(Contains(HasSubstr("moved to their floors"))));
+  }
+  // 4 of 4.6 m3
+  EXPECT_THAT(rib.report.guessed, Contains(HasSubstr(" 87 % of the volume at least (#")));
+  // two plates one above the other
+  EXPECT_THAT(made_with(5, 4, 0.2, -0.5).report.missing,
+              Contains("1 x SLAB: its parts have several thicknesses, or lie at several heights"));
+}
+
+TEST(ImportIfcWalls, WithRecessesInTheirOwnOutlineAreTold) {
+  const auto made_of = [](const std::vector<std::array<double, 2>>& outline) {
+    Writer w;
+    w.metres();
+    add_bay(w);
+    const std::string profile = w.add("IFCARBITRARYCLOSEDPROFILEDEF(.AREA.,$," + loop(w, outline) + ")");
+    w.element("IFCWALL", w.placement("$", 0, 0, 0), w.shape("SweptSolid", w.extrusion(profile, 3)));
+    return import("IFC4", w);
+  };
+  // 0.2 m thick with pilasters of 0.4 m
+  const Import made =
+      made_of({{0.15, -0.1}, {4.85, -0.1}, {4.85, 0.1}, {3.5, 0.1}, {3.5, 0.3}, {2.5, 0.3}, {2.5, 0.1}, {0.15, 0.1}});
+  EXPECT_THAT(made.text, HasSubstr("thickness = \"40 cm\""));
+  EXPECT_THAT(made.report.guessed, Contains(HasSubstr("1 wall fills only a part of the box around, 61 % at least (#")));
+  EXPECT_THAT(made_of({{0.15, -0.1}, {4.85, -0.1}, {4.85, 0.1}, {0.15, 0.1}}).report.guessed,
+              Not(Contains(HasSubstr("part of the box"))));
+}
+
+TEST(ImportIfcStoreys, OfWhichThereIsOneStandWhereItIsPlaced) {
+  Writer w;
+  w.metres();
+  for (const double x : {0.0, 5.0})
+    for (const double y : {0.0, 4.0}) block(w, "IFCCOLUMN", w.placement("$", x, y, 0), 0.3, 0.3, 2.8);
+  block(w, "IFCSLAB", w.placement("$", 2.5, 2, 2.8), 5, 4, 0.2);
+  w.add("IFCBUILDINGSTOREY('g',$,'1',$,$," + w.placement("$", 0, 0, 3) + ",$,$,.ELEMENT.,3.)");
+  EXPECT_THAT(import("IFC4", w).text, HasSubstr("heights = [\"3.000 m\"]"));
+}
+
 TEST(ImportIfcPlaces, HoldTheLargerOfTwoElements) {
   Writer w;
   w.metres();

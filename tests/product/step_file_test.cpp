@@ -28,6 +28,17 @@ TEST(StepFile, ReadsTextsOfEveryKind) {
   EXPECT_EQ(read("Stütze"), "Stütze");
 }
 
+TEST(StepFile, ReadsAllSectionsOfData) {
+  const std::string head =
+      "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('IFC4'));\nENDSEC;\nDATA('a',('IFC4'));\n#1=A();\nENDSEC;\n";
+  const StepFile file =
+      read_step(head + "/* second */\nDATA('b',('IFC4'));\n#2=B(#1);\nENDSEC ;\nEND-ISO-10303-21;\n", "f");
+  ASSERT_EQ(file.entities.size(), 2U);
+  EXPECT_EQ(file.entities.at(2).line, 10);
+  EXPECT_EQ(read_step(head, "f").entities.size(), 1U);
+  EXPECT_THROW((void)read_step(head + "DATA;\n#2=B(", "f"), InputError);
+}
+
 TEST(StepFile, RefusesIdsThatAreGivenTwice) {
   const std::string head = "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('IFC4'));\nENDSEC;\nDATA;\n";
   try {
