@@ -364,7 +364,8 @@ Steering::Made Steering::undo() {
     made.branch = &active();
     return made;
   }
-  if (is_fresh && entry.before.back().run->steps() == entry.before.back().step) {
+  // one that it has from the branch that it came from was made on a run of that one
+  if (is_fresh && entry.from == from.id && entry.before.back().run->steps() == entry.before.back().step) {
     const bool is_anew = from.pieces.front().run != entry.before.front().run;
     from.pieces = entry.before;
     from.edits.pop_back();

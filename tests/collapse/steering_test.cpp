@@ -392,6 +392,33 @@ TEST(Steering, UndoesOneEditAfterTheOther) {
   EXPECT_THROW(s.undo(), InputError);
 }
 
+TEST(Steering, UndoesWhatABranchHasFromAnotherOnARunOfItsOwn) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  advance_until(s, 0.2);
+  s.edit(delay_of_stage(1, 0.9), {}, true);
+  advance_until(s, 0.3);
+  s.edit(delay_of_stage(1, 0.8), {}, true);
+  advance_until(s, 0.4);
+  s.edit(delay_of_stage(1, 0.7), {}, true);
+  advance_until(s, 0.45);
+  // two of three, twice
+  for (const int last : {3, 5}) {
+    s.switch_to(1);
+    s.undo();
+    EXPECT_EQ(s.active().id, last - 1);
+    s.undo();
+    EXPECT_EQ(s.active().id, last);
+    EXPECT_NEAR(s.active().time, 0.3, 0.01);
+    EXPECT_EQ(s.active().edits.size(), 1U);
+    EXPECT_NEAR(s.active().run().model().plan().stages[1].time, 0.9, 1e-12);
+  }
+  advance_until(s, 0.6);
+  EXPECT_LT(s.branch(3).run().time(), 0.35) << "it was not the one that went on";
+  for (int id = 1; id <= 5; ++id)
+    for (int other = 1; other < id; ++other) EXPECT_NE(&s.branch(id).run(), &s.branch(other).run()) << id << other;
+}
+
 TEST(Steering, ABranchThatRestsKeepsItsBalanceOfEnergy) {
   Steering s(default_knowledge(), options());
   ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
