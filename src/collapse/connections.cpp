@@ -165,7 +165,7 @@ void Builder::request_station(int index, int which) {
       const double gap = std::abs(c.position - station.at) - 0.5 * c.destroyed_length;
       if (acts_here || gap > k.charge_transition_reach * depth) continue;
       in.concrete_loss = std::max(in.concrete_loss, c.transition_damage);
-      in.cover_lost = true;
+      lose_cover(in);
       station.damaged = library.request(in);
     }
 }

@@ -92,6 +92,7 @@ Fibres make_fibres(const ZoneInput& in, Axis axis) {
   const Frame f = make_frame(in, axis);
   Fibres out;
   out.half_depth = 0.5 * f.depth;
+  if (in.cover_lost && f.core_depth > 0 && f.core_breadth > 0) out.lost = 0.5 * (f.depth - f.core_depth);
   material::ConcreteInput plain = make_concrete_input(in);
   out.cover = material::make_concrete(plain);
   out.core = material::make_concrete(material::confine(plain, {calc_tie_stress(in)}));
@@ -205,6 +206,7 @@ Fibres make_fibres(const ZoneInput& in, double angle) {
   out.kept = kept;
   const double cover_kept = in.cover_lost ? 0 : kept;
   out.half_depth = outer;
+  out.lost = in.cover_lost ? outer - inner : 0;
   for (auto* v : {&out.at, &out.core_area, &out.cover_area}) v->clear();
   const auto add_strips = [&](int count, double from, double to) {
     const double t = (to - from) / count;
@@ -550,11 +552,11 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
   };
   accept(eps_0, origin);
 
-  // First yield: steel in tension, or the compressive strain of the peak at the edge.
+  // First yield: steel in tension, or the compressive strain of the peak at the edge of the concrete that is there.
   const auto yields = [&](double e, double k) {
     for (size_t i = 0; i < f.bar_at.size(); ++i)
       if (f.bar_area[i] > 0 && e + k * f.bar_at[i] > f.bar_law[i].eps_y) return true;
-    return e - std::abs(k) * f.half_depth < -f.cover.eps_c1;
+    return f.kept > 0 && e - std::abs(k) * (f.half_depth - f.lost) < -f.cover.eps_c1;
   };
   bool yielded = false;
   double previous_eps = eps_0, previous_slope = 0, previous_step = 1;

@@ -17,6 +17,7 @@ struct Fibres {
   std::vector<size_t> bar_row;                    // of each bar of the section; empty for a section at an angle
   material::Concrete core, cover;
   double half_depth = 0;  // [m]
+  double lost = 0;        // at each edge: the cover that is gone [m]
   double kept = 1;        // share of the concrete that bars displace: what cuts have left
   // Places along the axis of bending, of a section at an angle only: of the layers' core and cover [m] (L), bars [m]
   // (R)

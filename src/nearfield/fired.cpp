@@ -146,7 +146,7 @@ MomentFamily make_cage_family(std::vector<FreeBar> bars, int direction, double d
 ZoneInput make_partial_zone(const ZoneInput& intact, const LocalDamage& damage) {
   ZoneInput left = intact;
   left.concrete_loss = std::max(intact.concrete_loss, damage.transition_damage);
-  left.cover_lost = true;
+  lose_cover(left);
   left.length = std::min(damage.destroyed_length, kLongestZoneShare * calc_largest_zone_length(intact.concrete));
   left.cut_concrete = 1 - (1 - intact.cut_concrete) * damage.residual_concrete;
   left.cut_bars = 1 - (1 - intact.cut_bars) * damage.residual_bars;
@@ -180,7 +180,7 @@ FiredZone make_fired_zone(const ZoneInput& intact, const LocalDamage& damage) {
 
   ZoneInput beside = intact;
   beside.concrete_loss = std::max(intact.concrete_loss, damage.transition_damage);
-  beside.cover_lost = true;
+  lose_cover(beside);
   beside.length = std::min(std::max(s.width, s.height), kLongestZoneShare * calc_largest_zone_length(intact.concrete));
   out.transition = make_rcc(beside);
 

@@ -47,7 +47,8 @@ void add_shear(const ZoneInput& in, Rcc& out) {
   const double edge = 2 * (s.cover + 0.5 * s.tie_diameter);
   const double b_core = std::max(0.0, s.width - edge), h_core = std::max(0.0, s.height - edge);
   const double kept = in.concrete_loss >= 1 ? 0 : 1 - in.cut_concrete;
-  const double area = kept * (in.cover_lost ? b_core * h_core : s.area());
+  const double b = in.cover_lost ? b_core : s.width, h = in.cover_lost ? h_core : s.height;
+  const double area = kept * (b * h);
   const bool tied = s.tie_diameter > 0 && s.tie_spacing > 0;
   const double leg = 0.25 * pi * s.tie_diameter * s.tie_diameter;
   const double cot30 = std::sqrt(3.0);
@@ -69,19 +70,19 @@ void add_shear(const ZoneInput& in, Rcc& out) {
   out.shear_z = std::max(out.shear_z, dowel);
 
   const double enclosed = b_core * h_core, perimeter = 2 * (b_core + h_core);
-  const double a = std::max(s.width, s.height), t = std::min(s.width, s.height);
+  const double a = std::max({b, h, 1e-6}), t = std::min(b, h);
   const double cracking = kept * c.fct * t * t * a / (3 + 1.8 * t / a);
   double truss = 0;
   if (tied && perimeter > 0) {
     const double along = calc_bar_force(in, in.steel.fy) / perimeter, around = leg * in.steel.fy / s.tie_spacing;
-    const double wall = s.area() / (2 * (s.width + s.height));
+    const double wall = b * h / (2 * (b + h));
     truss = std::min(2 * enclosed * std::sqrt(along * around), 0.6 * c.fc * kept * enclosed * wall);
   }
   out.torsion = std::max(cracking, truss);
   // Saint-Venant's constant of a rectangle.
   const double saint_venant = a * t * t * t * (1.0 / 3 - 0.21 * t / a * (1 - std::pow(t / a, 4) / 12));
   const double G = c.Ec / 2.4;
-  out.GA = 5.0 / 6 * G * kept * s.area();
+  out.GA = 5.0 / 6 * G * kept * (b * h);
   out.GJ = 0.2 * G * kept * saint_venant;
   if (kept <= 0) out.GA = out.GJ = 0;
 }

@@ -37,6 +37,9 @@ struct ZoneInput {
   double free_bars = 0;  // length over which bars are free, clamped at its ends; 0: as the ties leave them [m]
 };
 
+/// The cover is gone, and with it a slab beside the web.
+inline void lose_cover(ZoneInput& in) { in.cover_lost = true, in.flange = {}; }
+
 /// One axis and one direction of bending: moments against the zone's rotation for each normal force. K forces, J
 /// rotations. The rows of the first force (crushing at no curvature) and of the last (rupture of all bars) are zero,
 /// and so is the last column: beyond the grid the zone is broken. A row that becomes zero earlier has lost its

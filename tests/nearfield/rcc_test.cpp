@@ -561,5 +561,43 @@ TEST(Rcc, RandomSectionsGiveSoundCurves) {
   EXPECT_GT(made, 300);
 }
 
+TEST(Rcc, WithoutCoverIsTheSectionThatIsLeft) {
+  ZoneInput bare = make_core();
+  product::Section& core = bare.section;
+  const double edge = core.cover + 0.5 * core.tie_diameter;
+  ZoneInput lost = bare;
+  lost.cover_lost = true;
+  // the same bars in a section that ends where the ties were
+  core.width = core.height = core.width - 2 * edge;
+  core.cover = 0, core.tie_diameter = 0;
+  lost.section.tie_spacing = 0;  // neither holds its bars
+  core.tie_spacing = 0;
+  const Rcc a = make_rcc(lost), b = make_rcc(bare);
+  EXPECT_NEAR(a.EA / b.EA, 1, 1e-12);
+  EXPECT_NEAR(a.GA / b.GA, 1, 1e-12);
+  EXPECT_NEAR(a.GJ / b.GJ, 1, 1e-12);
+  EXPECT_NEAR(a.torsion / b.torsion, 1, 1e-12);
+  EXPECT_NEAR(a.shear_y / b.shear_y, 1, 1e-12);
+  ASSERT_EQ(a.y_pos.normal_force.size(), b.y_pos.normal_force.size());
+  // first yield is that of its own edge: an edge that is gone yielded a third too early
+  for (size_t k = 0; k < a.y_pos.normal_force.size(); ++k)
+    if (a.y_pos.normal_force[k] > 0.9 * a.y_pos.normal_force.front()) {  // beyond it layers of other thickness tell
+      EXPECT_NEAR(a.y_pos.yield_moment[k], b.y_pos.yield_moment[k], 0.02 * peak_of(b.y_pos, k)) << k;
+    }
+}
+
+TEST(Rcc, BarsAloneYieldAsBars) {
+  ZoneInput in = make_core();
+  in.concrete_loss = 1;
+  const Rcc r = make_rcc(in);
+  const size_t k = row_of(r.y_pos, 0);
+  // the outer row at f_y or three quarters of the peak, not where an edge that is not there reaches eps_c1
+  double first = 0, depth = 0;
+  for (const product::Bar& bar : in.section.bars) depth = std::max(depth, bar.z);
+  for (const product::Bar& bar : in.section.bars) first += in.steel.fy * bar.area * bar.z * bar.z / depth;
+  first = std::min(first, 0.75 * peak_of(r.y_pos, k));
+  EXPECT_NEAR(r.y_pos.yield_moment[k], first, 0.03 * first);
+}
+
 }  // namespace
 }  // namespace topple::nearfield
