@@ -727,7 +727,7 @@ void add_rigid_block(const Context& c) {
   const Vec3 aside = centre - pivot - block.ahead * d;
   if (is_shaft && std::hypot(aside.x, aside.y) > kSkew * std::abs(block.ahead)) {
     c.add("rigid_block", "Mechanism", "Beside a rigid block",
-          "No comparison: the mouth does not lie in the planned direction.", kNone, "rad");
+          "No comparison: what is left of the ring does not lie behind the planned direction.", kNone, "rad");
     return;
   }
   block.above = (centre - pivot).z;

@@ -46,6 +46,10 @@ void read_zone(const Reading& reading, TableReader& root, SectionFile& out) {
   out.cut_concrete = zone.quantity("cut_concrete", Dimension::Number, {0, 0.95}, 0);
   out.concrete_loss = zone.quantity("transition_damage", Dimension::Number, fraction, 0);
   out.cover_lost = zone.find_flag("cover_lost").value_or(false);
+  if (out.cut_bars == 1 && out.concrete_loss == 1)
+    zone.error("E205", zone.place_of("cut_bars"),
+               "zone: without bars (cut_bars) and strength of the concrete (transition_damage) nothing is left",
+               "leave some of one of them");
   zone.finish();
 }
 

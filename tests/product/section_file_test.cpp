@@ -92,6 +92,8 @@ TEST(SectionFile, ComplainsAtThePlaceOfTheMistake) {
       {"\"1.5 MN\"", "\"1.5 m\"", "E204", "normal_force", 19, 25},
       {"[\"0 kN\", \"1.5 MN\", \"-200 kN\"]", "[]", "E209", "normal_force", 19, 16},
       {"cut_bars = 0.25", "cut_bars = 1.25", "E205", "cut_bars", 20, 12},
+      {"cut_bars = 0.25\ncut_concrete = \"10 %\"\ntransition_damage = 0.2",
+       "cut_bars = 1\ncut_concrete = \"10 %\"\ntransition_damage = 1", "E205", "nothing is left", 20, 12},
       {"cover_lost = true", "cover_lost = 1", "E202", "cover_lost", 23, 14},
       {"[section.column]", "[section.other]\n[section.column]", "E209", "one section", 10, 10},
       {"[zone]", "[grid]\n[zone]", "E203", "this is a plan", 17, 2},

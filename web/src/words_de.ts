@@ -63,7 +63,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["a rigid block in its place ({:.0f} t on {} plastic hinges of {:.2f} MNm in all, its mass centre {:.2f} m ahead of them)", "ein starrer Block an seiner Stelle ({} t auf {} Fließgelenken von zusammen {} MNm, sein Schwerpunkt {} m davor)"],
   ["a rigid block in its place ({:.0f} t on a plastic hinge of {:.2f} MNm, its mass centre {:.2f} m behind it)", "ein starrer Block an seiner Stelle ({} t auf einem Fließgelenk von {} MNm, sein Schwerpunkt {} m dahinter)"],
   ["a rigid block in its place ({:.0f} t on {} plastic hinges of {:.2f} MNm in all, its mass centre {:.2f} m behind them)", "ein starrer Block an seiner Stelle ({} t auf {} Fließgelenken von zusammen {} MNm, sein Schwerpunkt {} m dahinter)"],
-  ["No comparison: the mouth does not lie in the planned direction.", "Kein Vergleich: Die Öffnung liegt nicht in der geplanten Richtung."],
+  ["No comparison: what is left of the ring does not lie behind the planned direction.", "Kein Vergleich: Was vom Ring bleibt, liegt nicht hinter der geplanten Richtung."],
   ["No comparison: the upper block was in motion before the last stage fired.", "Kein Vergleich: Der obere Block war in Bewegung, bevor die letzte Zündstufe gezündet hat."],
   ["By comparison, {} would stay at rest: its weight alone does not turn it.", "Zum Vergleich: {} bliebe in Ruhe; sein Gewicht allein dreht ihn nicht."],
   ["Its hinge does not give before it yields, unlike a zone of the model.", "Sein Gelenk gibt nicht nach, bevor es fließt, anders als eine Zone des Modells."],
