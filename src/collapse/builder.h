@@ -102,7 +102,7 @@ struct BuilderState {
   bool hinge_about_y = true;
   Heads heads = Heads::OfTheFall;
   // of charges, which may be laid out anew while the model runs: laws are never taken out, so that their ids stay
-  std::map<std::pair<int, int>, int> partial_zones;  // stage and charge -> zone of a length that keeps some concrete
+  std::map<std::array<int, 3>, int> partial_zones;  // stage, charge and station -> zone of a length that keeps concrete
   std::map<std::tuple<int, double, double, double>, mbs::LawId> cage_laws;  // by element, length, bars and place
   std::map<std::tuple<int, double, double, std::string>, mbs::LawId> hinge_laws;
 };

@@ -53,7 +53,7 @@ std::vector<Firing> Builder::order_firings() const {
 mbs::LawId Builder::partial_law_of(const Firing& firing, const MemberZones& z, size_t station) {
   const product::Charge& c = charge_of(firing);
   const Member& m = member(c.member);
-  const int zone = partial_zones.at({firing.stage, firing.charge});
+  const int zone = partial_zones.at({firing.stage, firing.charge, static_cast<int>(station)});
   const Stiffness s = calc_stiffness(z);
   const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, fmt::format("{}/charge of {} m", m.name, c.destroyed_length));
   if (const auto it = hinge_laws.find(key); it != hinge_laws.end()) return it->second;
@@ -61,7 +61,8 @@ mbs::LawId Builder::partial_law_of(const Firing& firing, const MemberZones& z, s
   const Lever& lever = z.lever[station];
   const std::string name = m.name + "/charge";
   const mbs::SharedLaw beside = make_law(z.station[station].zone, s, name, bending, lever);
-  mbs::ZoneLaw law = make_partial_law(*make_law(zone, s, name, bending, lever), c.destroyed_length, *beside);
+  const double thickness = std::min(section_of(c.member).width, section_of(c.member).height);
+  mbs::ZoneLaw law = make_partial_law(*make_law(zone, s, name, bending, lever), c.destroyed_length, thickness, *beside);
   law.name = name;
   return hinge_laws[key] = mbs::add_law(model, std::move(law));
 }
@@ -291,7 +292,8 @@ void Builder::add_events(std::vector<Firing> schedule) {
       }
       event.actions.push_back(act);
       ZoneEntry& zone = map.elements[static_cast<size_t>(reached)];
-      zone.firing_time = std::min(zone.firing_time, firing.time);
+      double& time = is_partial ? zone.weakening_time : zone.firing_time;
+      time = std::min(time, firing.time);
     }
 
     if (is_partial)

@@ -157,9 +157,10 @@ void Builder::request_station(int index, int which) {
       const product::Charge& c = plan.stages[stage].charges[i];
       if (c.member != index || c.fails) continue;
       const bool acts_here = which == (is_column ? 0 : find_nearer_station(z, c.position));
-      if (acts_here && c.residual_concrete > 0)
-        partial_zones[{static_cast<int>(stage), static_cast<int>(i)}] = library.request(nearfield::make_partial_zone(
-            prepared, {c.destroyed_length, c.residual_bars, c.transition_damage, c.residual_concrete}));
+      if (c.residual_concrete > 0 && (acts_here || !is_column))
+        partial_zones[{static_cast<int>(stage), static_cast<int>(i), which}] =
+            library.request(nearfield::make_partial_zone(
+                prepared, {c.destroyed_length, c.residual_bars, c.transition_damage, c.residual_concrete}));
       // a charge elsewhere in the member may reach this zone
       if (!(c.transition_damage > 0)) continue;
       const double gap = std::abs(c.position - station.at) - 0.5 * c.destroyed_length;

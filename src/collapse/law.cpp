@@ -328,16 +328,17 @@ mbs::Curve make_curve(const nearfield::AxialCurve& from) {
   return out;
 }
 
-constexpr double kRise = 0.05;  // of the length, from what is left of one zone to what is crushed next
+constexpr double kMeets = 1e-3;  // of a weak length, over which both its ends come to bear
 
 /// Continues a zone's curve behind its length with the mean force of being crushed, for what is crushed then is the
 /// next zone of the member.
 void append_mean_force(double length, mbs::Curve& c) {
+  constexpr double rise = 0.05;  // of the length, from what is left of one zone to the mean of the others
   double work = 0;
   for (size_t i = 0; i + 1 < c.x.size(); ++i) work += 0.5 * (c.f[i] + c.f[i + 1]) * (c.x[i + 1] - c.x[i]);
   const double span = c.x.back();
   if (!(span > 0 && span <= length)) return;
-  c.x.push_back((1 + kRise) * length);
+  c.x.push_back((1 + rise) * length);
   c.f.push_back(work / span);
 }
 
@@ -509,7 +510,8 @@ double calc_crack_rotation(const mbs::Cracking& c, double moment) {
   return mbs::calc_crack_rotation(c, 0, std::max(moment, c.begin[0]));
 }
 
-mbs::ZoneLaw make_partial_law(mbs::ZoneLaw weak, double length, const mbs::ZoneLaw& beside) {
+mbs::ZoneLaw make_partial_law(mbs::ZoneLaw weak, double length, double thickness, const mbs::ZoneLaw& beside) {
+  weak.slip_rupture = std::max(weak.slip_rupture, thickness);
   mbs::Curve& c = weak.compression;
   // the mean force of what is crushed zone after zone holds as far as the length goes
   const auto after = static_cast<size_t>(std::lower_bound(c.x.begin(), c.x.end(), length) - c.x.begin());
@@ -518,12 +520,12 @@ mbs::ZoneLaw make_partial_law(mbs::ZoneLaw weak, double length, const mbs::ZoneL
     last = std::lerp(c.f[after - 1], c.f[after], (length - c.x[after - 1]) / (c.x[after] - c.x[after - 1]));
   c.x.resize(after), c.f.resize(after);
   c.x.push_back(length), c.f.push_back(last);
-  const double begin = (1 + kRise) * length;
+  const double begin = (1 + kMeets) * length;
   for (size_t i = 0; i < beside.compression.x.size(); ++i) {
     c.x.push_back(begin + beside.compression.x[i]);
     c.f.push_back(beside.compression.f[i]);
   }
-  weak.crush_length = begin + beside.crush_length;
+  weak.crush_length = length, weak.keeps_length = true;
   return weak;
 }
 

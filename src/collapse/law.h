@@ -91,9 +91,11 @@ mbs::SharedLaw scale_lever(const mbs::SharedLaw&, const Lever&);
 ///   moment, rotation  of the lever, about the axis of the cracks
 mbs::Cracking scale_lever(mbs::Cracking, double moment, double rotation);
 
-/// The law of a length that a charge did not wholly destroy: when it is crushed through, the member beside it is next.
-///   weak    of what is left of the length;  length  destroyed [m];  beside  of the member as it was there
-mbs::ZoneLaw make_partial_law(mbs::ZoneLaw weak, double length, const mbs::ZoneLaw& beside);
+/// The law of a length that a charge did not wholly destroy. The zone breaks when it is crushed through; behind that
+/// its curve is that of the ends which meet then.
+///   weak  of what is left of the length;  length  destroyed [m];  thickness  of the member, from whose ends it is off
+///   when it has slid so far [m];  beside  of the member as it was there
+mbs::ZoneLaw make_partial_law(mbs::ZoneLaw weak, double length, double thickness, const mbs::ZoneLaw& beside);
 
 /// Law of the bars that a charge leaves; nothing at all if there are none.
 mbs::ZoneLaw make_cage_law(const nearfield::ResidualCage&, double destroyed_length, const std::string& name,

@@ -92,7 +92,7 @@ void LiveModel::lay_out_events() {
   map_.debris.clear();
   map_.stubs.clear();
   map_.stages.clear();
-  for (ZoneEntry& z : map_.elements) z.firing_time = std::numeric_limits<double>::infinity();
+  for (ZoneEntry& z : map_.elements) z.firing_time = z.weakening_time = std::numeric_limits<double>::infinity();
   for (GroundColumn& g : map_.ground_columns) g.is_fired = false;
   for (size_t b = 0; b < shapes_.size(); ++b) {
     model.bodies[b].shapes = shapes_[b];
@@ -192,7 +192,6 @@ void LiveModel::request_zones_of(int member) {
   for (int which : {0, 1}) builder.request_station(member, which);
   builder.library.compute(1);
   built_ = std::move(static_cast<BuilderState&>(builder));
-  note_without_stump(member);
 }
 
 void LiveModel::note_without_stump(int member) {
@@ -211,6 +210,7 @@ std::string LiveModel::fire(const Edit& e, double time, double next) {
     c.fails = false;
     plan_.stages[static_cast<size_t>(c.stage)].charges[static_cast<size_t>(c.index)].fails = false;
     request_zones_of(charge(c).member);
+    if (!(charge(c).residual_concrete > 0)) note_without_stump(charge(c).member);
   }
   return fmt::format("{} fires now, at {}", member_of(c), words_of_time(next));
 }
@@ -275,6 +275,8 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
   demand(is_share(e.residual_bars), "residual_bars must be 0 to 1");
   demand(is_share(e.transition_damage), "transition_damage must be 0 to 1");
   demand(product::is_within(e.residual_concrete, limits::residual_concrete), "residual_concrete must be 0 to 0.95");
+  demand(!(e.residual_concrete > 0 && e.residual_bars == 0 && e.transition_damage == 1),
+         "of concrete without strength and no bars nothing is left", "leave residual_concrete out");
   if (e.residual_concrete > 0 && !product::can_keep_concrete(m))
     refuse("residual_concrete is known of columns of the ground storey and of beams along x");
   const double low = e.position - 0.5 * e.destroyed_length, high = e.position + 0.5 * e.destroyed_length;
@@ -313,6 +315,7 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
   charges_.push_back(
       {static_cast<int>(stage), static_cast<int>(plan_.stages[stage].charges.size()) - 1, t, false, false, true});
   request_zones_of(index);
+  if (!(c.residual_concrete > 0)) note_without_stump(index);
   return fmt::format("a charge on {} at {:.3g} m, destroying {:.3g} m, fires at {}", m.name, e.position,
                      e.destroyed_length, words_of_time(t));
 }

@@ -29,7 +29,8 @@ struct ZoneEntry {
   std::string name, member, subsystem;  // as in record::ZoneInfo
   int body_a = -1, body_b = -1;
   Vec3 p_W;
-  double firing_time = std::numeric_limits<double>::infinity();  // of the charge that acts on it [s]
+  double firing_time = std::numeric_limits<double>::infinity();     // of the charge that acts on it [s]
+  double weakening_time = std::numeric_limits<double>::infinity();  // of one that leaves part of the concrete [s]
 };
 
 /// What an event of the model is in the plan.

@@ -651,7 +651,7 @@ void Recorder::add_happening(const mbs::Happening& h) {
       const bool has_law = i < model_.elements.size() && !model_.elements[i].stations.empty();
       if (h.reason == "crushing") {
         how = "is crushed";
-        if (has_law && z.firing_time > h.time) {
+        if (has_law && std::min(z.firing_time, z.weakening_time) > h.time) {
           const mbs::ZoneElement& e = model_.elements[i];
           const mbs::ZoneLaw& law = model_.laws[static_cast<size_t>(e.stations.front().law.index)];
           const double u = mbs::calc_crush_length(e.crush_through, law);

@@ -129,8 +129,9 @@ double System::calc_end_bearing(size_t b, int shape, const Vec3& outward) const 
   const CrushedBox& box = state.crushed_boxes[static_cast<size_t>(s.crushed)];
   if (box.taken >= box.most || box.end * dot(state.R[b] * s.R_BS.column(box.axis), outward) < kHeadOn)
     return kUnlimited;
-  const ZoneParameters& zone = elements[static_cast<size_t>(box.element)].zone;
-  return calc_curve(laws[static_cast<size_t>(zone.law[0])].compression, box.begin + box.taken);
+  const size_t e = static_cast<size_t>(box.element);
+  const int law = find_ruling_law(elements[e].zone, state.element[e]);
+  return calc_curve(laws[static_cast<size_t>(law)].compression, box.begin + box.taken);
 }
 
 double System::crush_ends(size_t a, int shape_a, size_t b, int shape_b, const Vec3& n, const ContactLaw& law,

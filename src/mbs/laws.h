@@ -36,16 +36,17 @@ struct MomentFamily {
 struct ZoneLaw {
   std::string name;
   MomentFamily moment_y, moment_z;
-  double biaxial_exponent = 1.5;           // (|My|/Ly)^p + (|Mz|/Lz)^p <= 1
-  double rotation_ratio = 1;               // what of the edges a rotation about z strains over one about y
-  double damage_share = 0;                 // share of the inelastic rotation that is recovered on unloading, 0..1
-  double rupture_rotation = kUnlimited;    // plastic rotation at which the element breaks altogether [rad]
-  double rupture_rotation_pressed = 0;     // the same while its normal force presses, if that is more [rad]
-  Curve compression;                       // limit against plastic shortening [m] -> [N]
-  Curve tension;                           // limit against plastic elongation [m] -> [N]
-  bool buckles = false;                    // shortened, it pulls only once it is straight again: slender bars
-  double crush_length = kUnlimited;        // plastic shortening at which the element breaks [m]
-  double rupture_elongation = kUnlimited;  // plastic elongation at which it breaks [m]
+  double biaxial_exponent = 1.5;         // (|My|/Ly)^p + (|Mz|/Lz)^p <= 1
+  double rotation_ratio = 1;             // what of the edges a rotation about z strains over one about y
+  double damage_share = 0;               // share of the inelastic rotation that is recovered on unloading, 0..1
+  double rupture_rotation = kUnlimited;  // plastic rotation at which the element breaks altogether [rad]
+  double rupture_rotation_pressed = 0;   // the same while its normal force presses, if that is more [rad]
+  Curve compression;                     // limit against plastic shortening [m] -> [N]
+  Curve tension;                         // limit against plastic elongation [m] -> [N]
+  bool buckles = false;                  // shortened, it pulls only once it is straight again: slender bars
+  double crush_length = kUnlimited;      // plastic shortening at which the element breaks [m]
+  bool keeps_length = false;  // breaks there also where the element's crush_through is more: a weak length of a member
+  double rupture_elongation = kUnlimited;             // plastic elongation at which it breaks [m]
   double shear_y = kUnlimited, shear_z = kUnlimited;  // limits without normal force [N]
   double shear_friction = 0;                          // further limit per newton of compression
   double slip_softening = kUnlimited;  // slip over which the shear limits fall to their friction part [m]

@@ -199,6 +199,7 @@ ZoneLaw law_from(const Node& n) {
   read(n, "rupture_rotation_pressed", l.rupture_rotation_pressed);
   read(n, "buckles", l.buckles);
   read(n, "crush_length", l.crush_length);
+  read(n, "keeps_length", l.keeps_length);
   read(n, "rupture_elongation", l.rupture_elongation);
   read(n, "shear_y", l.shear_y);
   read(n, "shear_z", l.shear_z);

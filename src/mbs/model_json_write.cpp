@@ -82,6 +82,7 @@ Json json_of(const ZoneLaw& l) {
   if (!l.tension.x.empty()) j["tension"] = json_of(l.tension);
   if (l.buckles) j["buckles"] = true;
   put(j, "crush_length", l.crush_length);
+  if (l.keeps_length) j["keeps_length"] = true;
   put(j, "rupture_elongation", l.rupture_elongation);
   put(j, "shear_y", l.shear_y);
   put(j, "shear_z", l.shear_z);

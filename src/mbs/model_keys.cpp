@@ -58,6 +58,7 @@ const std::vector<KeyList>& model_json_keys() {
         "tension",
         "buckles",
         "crush_length",
+        "keeps_length",
         "rupture_elongation",
         "shear_y",
         "shear_z",

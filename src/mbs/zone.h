@@ -110,12 +110,17 @@ struct ZoneParameters {
 ///   crush_through  as of a ZoneElement [m]
 template <class Law>
 double calc_crush_length(double crush_through, const Law& law) {
-  return law.buckles ? law.crush_length : std::max(law.crush_length, crush_through);
+  return law.buckles || law.keeps_length ? law.crush_length : std::max(law.crush_length, crush_through);
+}
+
+/// The law that rules the first station, or is on its way to; -1: none.
+inline int find_ruling_law(const ZoneParameters& p, const ZoneState& z) {
+  return z.next_law >= 0 ? z.next_law : z.base_law >= 0 ? z.base_law : p.law[0];
 }
 
 /// Whether what shortens a zone now is crushing: it is live, and its law, or the one on its way, does not buckle.
 inline bool is_crushed_by_shortening(const ZoneParameters& p, const CompiledLaws& laws, const ZoneState& z) {
-  const int law = z.next_law >= 0 ? z.next_law : z.base_law >= 0 ? z.base_law : p.law[0];
+  const int law = find_ruling_law(p, z);
   return z.live && law >= 0 && !laws[static_cast<size_t>(law)].buckles;
 }
 

@@ -61,13 +61,18 @@ CompiledLaw compile_law(const ZoneLaw& law) {
   c.compression = {law.compression.x, law.compression.f};
   c.tension = {law.tension.x, law.tension.f};
   if (!law.compression.f.empty()) {
-    const auto peak = std::max_element(law.compression.f.begin(), law.compression.f.end());
+    // what lies behind a length that is kept is of the end that has been crushed so far
+    const auto end = law.keeps_length
+                         ? std::upper_bound(law.compression.x.begin(), law.compression.x.end(), law.crush_length) -
+                               law.compression.x.begin()
+                         : static_cast<std::ptrdiff_t>(law.compression.f.size());
+    const auto peak = std::max_element(law.compression.f.begin(), law.compression.f.begin() + end);
     c.peak_compression = *peak;
     c.peak_shortening = law.compression.x[static_cast<size_t>(peak - law.compression.f.begin())];
   } else {
     c.peak_shortening = kUnlimited;
   }
-  c.buckles = law.buckles;
+  c.buckles = law.buckles, c.keeps_length = law.keeps_length;
   c.biaxial_exponent = law.biaxial_exponent;
   c.rotation_ratio = law.rotation_ratio;
   c.damage_share = law.damage_share;

@@ -38,7 +38,7 @@ struct CompiledLaw {
   CompiledCurve compression, tension;
   double peak_compression = 0, peak_shortening = 0;  // of the compression curve [N, m]
   bool elongates = false;                            // some family has an elongation
-  bool buckles = false;
+  bool buckles = false, keeps_length = false;
   double biaxial_exponent = 1.5, rotation_ratio = 1, damage_share = 0, crush_length = 0, rupture_elongation = 0;
   double rupture_rotation = 0, rupture_rotation_pressed = 0;  // the latter while N < 0, never the lesser one
   double shear[2] = {0, 0}, shear_friction = 0, slip_softening = 0, slip_rupture = 0, torsion = 0, twist_rupture = 0;

@@ -38,6 +38,10 @@ ChargeTable read_charge(TableReader& table) {
   c.charge.residual_bars = table.quantity("residual_bars", Dimension::Number, fraction, 0);
   c.charge.residual_concrete = table.quantity("residual_concrete", Dimension::Number, limits::residual_concrete, 0);
   c.charge.transition_damage = table.quantity("transition_damage", Dimension::Number, fraction, 0);
+  if (c.charge.residual_concrete > 0 && c.charge.residual_bars == 0 && c.charge.transition_damage == 1)
+    table.error("E205", table.place_of("residual_concrete"),
+                "residual_concrete: of concrete without strength (transition_damage) and no bars nothing is left",
+                "leave it out: the charge then destroys all");
   const Sector sector = read_sector(table);
   c.charge.azimuth = sector.azimuth, c.charge.opening = sector.opening;
   c.charge.delay = table.quantity("delay", Dimension::Time, {0, 600}, 0);
@@ -69,7 +73,7 @@ class Blasting {
         if (!std::exchange(is_misplaced, true))
           table.error("E307", table.place_of("residual_concrete"),
                       m.name + " is neither a column of the ground storey nor a beam along x",
-                      "what a charge leaves of the concrete is known of these; leave it out, or say `fails = true`");
+                      "what a charge leaves of the concrete is known of these; take it out there");
         continue;
       }
       if (!is_misplaced && !check_sector(table, m)) is_misplaced = true;
