@@ -96,6 +96,33 @@ TEST(CrushedBoxPhysics, AMemberEndsWhenAllOfItIsCrushed) {
   EXPECT_NEAR(height, 2.25 - kThrough, 0.02);
 }
 
+TEST(CrushedBoxPhysics, EndsMeetWhereAWeakLengthIsCrushedThrough) {
+  // 0.3 m that bear a quarter; the element breaks, and the post stands on its end, which bears what it always did
+  constexpr double kWeak = 0.25 * kBears;
+  Model m = make_post();
+  ZoneLaw weak = *m.laws.shared(0);
+  weak.compression = {{0, kZone, 1.001 * kZone, 10}, {kWeak, kWeak, kBears, kBears}};
+  weak.keeps_length = true;
+  m.events.push_back(make_event(0, Action::Kind::SwitchLaw, 0));
+  m.events.back().actions.front().element = {0};
+  m.events.back().actions.front().law = add_law(m, weak);
+  // what comes down brings 1/2 m v² and its weight, over both ways
+  const double way = kZone + (kMass * (0.5 * kSpeed * kSpeed + 9.81 * kZone) - kWeak * kZone) / (kBears - kMass * 9.81);
+  for (const double step : {1e-4, 5e-5}) {
+    Options o = options_of(step);
+    double broken_at = 1e9, least = 1e9;
+    std::string reason;
+    o.on_happening = [&](const Happening& h) {
+      if (h.kind == Happening::Kind::ElementBroken) reason = h.reason, broken_at = least;
+    };
+    o.on_frame = [&](const View& v) { least = std::min(least, v.X_WB[0].p.z); };
+    EXPECT_LT(run(m, o).energy_error, 0.01);
+    EXPECT_EQ(reason, "crushing");
+    EXPECT_NEAR(broken_at, 2.25 - kZone, 0.01);
+    EXPECT_NEAR(2.25 - least, way, 0.01 * way) << step;
+  }
+}
+
 /// Lowest place of the plate when the post comes down on its end.
 double land(Model m, double step, double& energy_error) {
   m.events.push_back(make_event(0, Action::Kind::RemoveElement, 0));
