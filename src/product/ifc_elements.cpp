@@ -8,7 +8,6 @@
 #include <optional>
 #include <set>
 #include <string_view>
-#include <tuple>
 
 #include "base/error.h"
 #include "base/unit.h"
@@ -24,6 +23,7 @@ using Kind = StepValue::Kind;
 
 /// Of its box, what the volume of a mesh has to fill to be taken for it. Walls have openings.
 constexpr double kFilled = 0.9, kFilledWall = 0.5, kOverfilled = 1.02;
+constexpr double kLevel = 0.01;          // parts of a slab lie as level as that, or one on the other [m]
 constexpr double kPlate = 0.8;           // of a slab's volume, at least in the plate of its parts
 constexpr double kLargestCircle = 1.06;  // around a round mesh, over its box: of a polygon with 10 corners at most
 constexpr double kFarthest = 1e8;        // coordinate of an element [m]
@@ -940,18 +940,37 @@ class Reader {
     if (!body.points.empty()) return;
     for (const Solid& solid : body.shape.solids)
       if (std::hypot(solid.way.x, solid.way.y) > 1e-3 * std::abs(solid.way.z)) return;
-    const auto range = [](const Solid& solid) {
-      const double z = solid.loops.front().front().z;
-      return std::minmax({z, z + solid.way.z});
+    struct Layer {
+      double low = 0, high = 0, area = 0;
     };
-    double low = 0, high = 0, most = 0, all = 0, plate = 0;
+    const auto layer_of = [](const Solid& solid) {
+      const double z = solid.loops.front().front().z;
+      const auto [low, high] = std::minmax({z, z + solid.way.z});
+      return Layer{low, high, solid.volume() / (high - low)};
+    };
+    const auto is_near = [](double a, double b) { return std::abs(a - b) < kLevel; };
+    Layer most;
     for (const Solid& solid : body.shape.solids)
-      if (const double area = solid.volume() / std::abs(solid.way.z); area > most)
-        most = area, std::tie(low, high) = range(solid);
+      if (const Layer layer = layer_of(solid); layer.area > most.area) most = layer;
+    // what covers as much right above or below it is a layer of the plate
+    std::vector<Layer> layers{most};
+    double low = most.low, high = most.high;
+    for (size_t known = 0; known != layers.size();) {
+      known = layers.size();
+      for (const Solid& solid : body.shape.solids) {
+        const Layer layer = layer_of(solid);
+        if (layer.area < kFilled * most.area || !(is_near(layer.low, high) || is_near(layer.high, low))) continue;
+        low = std::min(low, layer.low), high = std::max(high, layer.high);
+        layers.push_back(layer);
+      }
+    }
+    double all = 0, plate = 0;
     for (const Solid& solid : body.shape.solids) {
       all += solid.volume();
-      const auto [bottom, top] = range(solid);
-      if (std::abs(bottom - low) > kNear || std::abs(top - high) > kNear) continue;
+      const Layer own = layer_of(solid);
+      if (std::none_of(layers.begin(), layers.end(),
+                       [&](const Layer& l) { return is_near(own.low, l.low) && is_near(own.high, l.high); }))
+        continue;
       plate += solid.volume();
       std::vector<Loop> loops = solid.loops;
       for (Loop& loop : loops)

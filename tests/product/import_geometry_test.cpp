@@ -276,6 +276,10 @@ TEST(ImportIfcBoxes, OfSlabsAreThatOfTheirPlate) {
   }
   // 4 of 4.6 m3
   EXPECT_THAT(rib.report.guessed, Contains(HasSubstr(" 87 % of the volume at least (#")));
+  // a topping of 14 cm on planks of 6 would be one plate, as 20 cm and 4 cm more are
+  const Import layers = made_with(5, 4, 0.04, 0.2);
+  EXPECT_THAT(layers.text, HasSubstr("thickness = \"24 cm\""));
+  EXPECT_THAT(layers.report.guessed, Not(Contains(HasSubstr("of several parts"))));
   // two plates one above the other
   EXPECT_THAT(made_with(5, 4, 0.2, -0.5).report.missing,
               Contains("1 x SLAB: its parts have several thicknesses, or lie at several heights"));
