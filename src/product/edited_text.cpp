@@ -309,7 +309,10 @@ void check_fuzzy_charges(const Plan& before, const Plan& after) {
         for (size_t t = 0; t < after.stages.size(); ++t)
           for (size_t d = 0; d < after.stages[t].charges.size(); ++d) {
             const Charge& now = after.stages[t].charges[d];
-            if (now.member != old.member || now.fails || std::abs(now.position - old.position) > 1e-9) continue;
+            const bool is_other = now.member != old.member || std::abs(now.position - old.position) > 1e-9 ||
+                                  std::abs(now.azimuth - old.azimuth) > 1e-9 ||
+                                  std::abs(now.opening - old.opening) > 1e-9;
+            if (is_other || now.fails) continue;
             // a delay that has been set is meant
             if (p.back().key == "delay" && now.delay != old.delay) continue;
             if (!varied.contains(key_of(p, static_cast<int>(t), new_numbers[t][d])))

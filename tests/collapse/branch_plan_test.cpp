@@ -284,6 +284,26 @@ TEST(BranchPlan, KeepsChargesVariedThatFuzzyPathsName) {
   }
 }
 
+TEST(BranchPlan, KnowsMouthsAtOneHeightByTheirDirection) {
+  std::string text;
+  std::vector<Diagnostic> warnings;
+  (void)product::read_plan_file(TOPPLE_SOURCE_DIR "/examples/templates/chimney.toml", warnings, text);
+  // its mouth by two charges, one beside the other
+  for (const auto& [old_words, new_words] : {std::pair{"azimuth = \"180 deg\"", "azimuth = \"129.5 deg\""},
+                                             {"opening = \"202 deg\"", "opening = \"101 deg\""}})
+    text.replace(text.find(old_words), std::string(old_words).size(), new_words);
+  text +=
+      "\n[[stage.charge]]\nmembers = \"chimney\"\nposition = \"2.5 m\"\ndestroyed_length = \"2 m\"\n"
+      "azimuth = \"230.5 deg\"\nopening = \"101 deg\"\nresidual_bars = 0.05\n"
+      "\n[fuzzy]\nstage.1.charge.1.residual_bars = { triangular = [0, 0.05, 0.1] }\n";
+  const product::Plan plan = read(text);
+  ASSERT_EQ(plan.stages.front().charges.size(), 2U);
+  const BranchPlan b = write_branch_plan(edited(plan, {{0, R"({"command": "set_friction", "ground": 0.5})"},
+                                                       {0, R"({"command": "set_delay", "charge": 1, "delay": 0.1})"}}));
+  EXPECT_TRUE(b.left_out.empty()) << b.left_out.front();
+  EXPECT_EQ(b.taken.size(), 2U);
+}
+
 TEST(BranchPlan, KeepsNumbersOfChargesThatFuzzyPathsName) {
   const std::string fuzzy = "[fuzzy]\nstage.2.charge.1.delay = { triangular = [\"0 ms\", \"0 ms\", \"30 ms\"] }\n";
   const product::Plan plan = staged(fuzzy);
