@@ -194,11 +194,14 @@ void LiveModel::request_zones_of(int member) {
   built_ = std::move(static_cast<BuilderState&>(builder));
 }
 
-void LiveModel::note_without_stump(int member) {
-  const Member& m = plan_.members[static_cast<size_t>(member)];
-  if (m.kind == MemberKind::Column && !built_.lowest_charge.count(member))
-    map_.notes.push_back(
-        {"Added charge", m.name + " was built without a charge: what lies below the added one leaves with it."});
+void LiveModel::note_without_stump(const product::Charge& c) {
+  const Member& m = plan_.members[static_cast<size_t>(c.member)];
+  if (m.kind != MemberKind::Column || built_.lowest_charge.count(c.member)) return;
+  map_.notes.push_back({"Added charge", c.residual_concrete > 0
+                                            ? m.name + " was built without a charge: what the added one leaves is "
+                                                       "taken at its foot."
+                                            : m.name + " was built without a charge: what lies below the added one "
+                                                       "leaves with it."});
 }
 
 std::string LiveModel::fire(const Edit& e, double time, double next) {
@@ -210,7 +213,7 @@ std::string LiveModel::fire(const Edit& e, double time, double next) {
     c.fails = false;
     plan_.stages[static_cast<size_t>(c.stage)].charges[static_cast<size_t>(c.index)].fails = false;
     request_zones_of(charge(c).member);
-    if (!(charge(c).residual_concrete > 0)) note_without_stump(charge(c).member);
+    note_without_stump(charge(c));
   }
   return fmt::format("{} fires now, at {}", member_of(c), words_of_time(next));
 }
@@ -315,7 +318,7 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
   charges_.push_back(
       {static_cast<int>(stage), static_cast<int>(plan_.stages[stage].charges.size()) - 1, t, false, false, true});
   request_zones_of(index);
-  if (!(c.residual_concrete > 0)) note_without_stump(index);
+  note_without_stump(c);
   return fmt::format("a charge on {} at {:.3g} m, destroying {:.3g} m, fires at {}", m.name, e.position,
                      e.destroyed_length, words_of_time(t));
 }

@@ -66,7 +66,7 @@ class LiveModel {
   void refuse_in_stump(int member, double position) const;
   /// After a charge of its own has changed: what it leaves of the member's zones.
   void request_zones_of(int member);
-  void note_without_stump(int member);
+  void note_without_stump(const product::Charge&);
   std::string fire(const Edit&, double time, double next);
   std::string set_delay(const Edit&, double time);
   std::string add_charge(const Edit&, double time, double next);

@@ -100,9 +100,19 @@ const Hull* System::hull_of(int shape) {
   return &own.hull;
 }
 
+double System::calc_crushed_through(size_t e) const {
+  const ZoneState& z = state.element[e];
+  const int ruling = find_ruling_law(elements[e].zone, z);
+  if (z.live || ruling < 0 || z.reason != BreakReason::Crushing) return 0;
+  const CompiledLaw& law = laws[static_cast<size_t>(ruling)];
+  return law.keeps_length ? law.end_begins : 0;
+}
+
 void System::shorten_boxes() {
   State& s = state;
-  if (s.step_index % kStepsBetween != 0) return;
+  // those of elements that have just broken at once: what comes next meets the end behind the weak length
+  const bool is_look = s.step_index % kStepsBetween == 0;
+  if (!is_look && !s.links_due) return;
   int last = -1;
   double shortening = 0;
   for (CrushedBox& box : s.crushed_boxes) {
@@ -114,14 +124,16 @@ void System::shorten_boxes() {
       if (is_crushed_by_shortening(elements[e].zone, laws, z)) {
         const size_t slot = slot_of(e);
         const bool flows = lanes->field(slot, kernel::kFlows) > 0;
-        shortening = flows ? lanes->flow(slot, kernel::kShortened) : z.shortened;
+        shortening = !is_look ? 0 : flows ? lanes->flow(slot, kernel::kShortened) : z.shortened;
+      } else {
+        shortening = calc_crushed_through(e);
       }
     }
     if (shortening > box.begin + box.taken) shorten_shape(box, shortening);
   }
 }
 
-double System::calc_end_bearing(size_t b, int shape, const Vec3& outward) const {
+double System::calc_end_bearing(size_t b, int shape, const Vec3& outward, double way) const {
   constexpr double kHeadOn = 0.7;  // cosine of the angle between the member and the normal up to which its end is met
   if (b == B) return kUnlimited;
   const CompiledShape& s = state.shapes[static_cast<size_t>(shape)];
@@ -130,15 +142,15 @@ double System::calc_end_bearing(size_t b, int shape, const Vec3& outward) const 
   if (box.taken >= box.most || box.end * dot(state.R[b] * s.R_BS.column(box.axis), outward) < kHeadOn)
     return kUnlimited;
   const size_t e = static_cast<size_t>(box.element);
-  const int law = find_ruling_law(elements[e].zone, state.element[e]);
-  return calc_curve(laws[static_cast<size_t>(law)].compression, box.begin + box.taken);
+  const CompiledLaw& law = laws[static_cast<size_t>(find_ruling_law(elements[e].zone, state.element[e]))];
+  const double from = box.begin + box.taken;
+  // it meets what it meets at full speed, and its peak may be as narrow as the way between two looks
+  return calc_mean(law.compression, from, from + (law.keeps_length ? way : 0));
 }
 
 double System::crush_ends(size_t a, int shape_a, size_t b, int shape_b, const Vec3& n, const ContactLaw& law,
                           size_t first, double h) {
-  const double bears_a = calc_end_bearing(a, shape_a, n), bears_b = calc_end_bearing(b, shape_b, -n);
-  const double bears = std::min(bears_a, bears_b);
-  if (bears == kUnlimited) return 0;
+  if (std::min(calc_end_bearing(a, shape_a, n, 0), calc_end_bearing(b, shape_b, -n, 0)) == kUnlimited) return 0;
   State& s = state;
   const std::span<ContactPoint> points = std::span(contact.point).subspan(first);
   const bool is_ground = b == B;
@@ -149,6 +161,10 @@ double System::crush_ends(size_t a, int shape_a, size_t b, int shape_b, const Ve
     if (!is_ground) v -= s.v[b] + cross(s.w[b], p_a + p.at - p_b);
     return dot(n, v);
   };
+  double way = 0;  // until the next look
+  for (const ContactPoint& p : points) way = std::max(way, contact_interval * h * speed_of(p));
+  const double bears_a = calc_end_bearing(a, shape_a, n, way), bears_b = calc_end_bearing(b, shape_b, -n, way);
+  const double bears = std::min(bears_a, bears_b);
   // force over depth, and its growth in a step
   const auto rate_of = [&](const ContactPoint& p, double speed) {
     const double spring = p.stiffness * p.depth;

@@ -671,7 +671,9 @@ class System {
   void shorten_shape(CrushedBox&, double shortening);
   /// What the end of a member bears against a surface with this normal out of body b [N]; unlimited for other shapes
   /// and where the member is not met head on.
-  double calc_end_bearing(size_t b, int shape, const Vec3& outward) const;
+  /// How much of its boxes is gone with a weak length that was crushed through; 0: none was [m].
+  double calc_crushed_through(size_t element) const;
+  double calc_end_bearing(size_t b, int shape, const Vec3& outward, double way) const;
   /// Crushes the weaker of two ends that meet, or one that meets something, as far as it bears less than what presses
   /// there: its box gets shorter and the points come out by as much, which is returned [m].
   ///   b      B: the ground

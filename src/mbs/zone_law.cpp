@@ -62,10 +62,12 @@ CompiledLaw compile_law(const ZoneLaw& law) {
   c.tension = {law.tension.x, law.tension.f};
   if (!law.compression.f.empty()) {
     // what lies behind a length that is kept is of the end that has been crushed so far
-    const auto end = law.keeps_length
-                         ? std::upper_bound(law.compression.x.begin(), law.compression.x.end(), law.crush_length) -
-                               law.compression.x.begin()
-                         : static_cast<std::ptrdiff_t>(law.compression.f.size());
+    auto end = static_cast<std::ptrdiff_t>(law.compression.f.size());
+    if (law.keeps_length) {
+      const std::vector<double>& x = law.compression.x;
+      end = std::upper_bound(x.begin(), x.end(), law.crush_length) - x.begin();
+      c.end_begins = end < static_cast<std::ptrdiff_t>(x.size()) ? x[static_cast<size_t>(end)] : law.crush_length;
+    }
     const auto peak = std::max_element(law.compression.f.begin(), law.compression.f.begin() + end);
     c.peak_compression = *peak;
     c.peak_shortening = law.compression.x[static_cast<size_t>(peak - law.compression.f.begin())];
@@ -97,6 +99,19 @@ double calc_curve(const CompiledCurve& curve, double x) {
   const size_t i = static_cast<size_t>(std::upper_bound(curve.x.begin(), curve.x.end(), x) - curve.x.begin()) - 1;
   const double t = (x - curve.x[i]) / (curve.x[i + 1] - curve.x[i]);
   return curve.f[i] + t * (curve.f[i + 1] - curve.f[i]);
+}
+
+double calc_mean(const CompiledCurve& curve, double from, double to) {
+  if (curve.x.empty() || !(to > from)) return calc_curve(curve, from);
+  double work = 0, x = from, f = calc_curve(curve, from);
+  const auto go = [&](double next) {
+    const double at = calc_curve(curve, next);
+    work += 0.5 * (f + at) * (next - x);
+    x = next, f = at;
+  };
+  for (auto i = std::upper_bound(curve.x.begin(), curve.x.end(), from); i != curve.x.end() && *i < to; ++i) go(*i);
+  go(to);
+  return work / (to - from);
 }
 
 double calc_integrity(const CompiledLaw& law, double shortened) {

@@ -37,7 +37,8 @@ struct CompiledLaw {
   CompiledFamily moment[2];  // about y, about z; both by rotations about y that strain the edges as much
   CompiledCurve compression, tension;
   double peak_compression = 0, peak_shortening = 0;  // of the compression curve [N, m]
-  bool elongates = false;                            // some family has an elongation
+  double end_begins = 0;   // of one that keeps its length: from where on the curve is of the end that is left [m]
+  bool elongates = false;  // some family has an elongation
   bool buckles = false, keeps_length = false;
   double biaxial_exponent = 1.5, rotation_ratio = 1, damage_share = 0, crush_length = 0, rupture_elongation = 0;
   double rupture_rotation = 0, rupture_rotation_pressed = 0;  // the latter while N < 0, never the lesser one
@@ -64,6 +65,8 @@ class CompiledLaws {
 
 /// Value of a curve, constant beyond its ends; infinity for an empty one.
 double calc_curve(const CompiledCurve&, double x);
+/// Its mean from one place to a later one; its value where both are one.
+double calc_mean(const CompiledCurve&, double from, double to);
 
 /// Share of the section that is left after a shortening [m]: 1 until the peak of the compression curve.
 double calc_integrity(const CompiledLaw&, double shortened);

@@ -237,6 +237,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["cable {} is let go", "Seil {} wird losgelassen"],
   ["friction of the ground {:g}, of the parts {:g}", "Reibung am Boden {}, zwischen den Teilen {}"],
   ["friction of the ground {:g}", "Reibung am Boden {}"],
+  ["{} was built without a charge: what the added one leaves is taken at its foot.", "{} wurde ohne Ladung gebaut: Was die hinzugefügte lässt, wird an seinem Fuß angenommen."],
   ["{} was built without a charge: what lies below the added one leaves with it.", "{} wurde ohne Ladung gebaut: Was unter der hinzugefügten liegt, verschwindet mit ihr."],
   ["Everything came to rest at {:.2f} s.", "Bei {} s kam alles zur Ruhe."],
   ["Stopped by the time limit of {:.2f} s.", "Durch die Zeitgrenze von {} s beendet."],
