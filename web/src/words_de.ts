@@ -490,6 +490,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["the destroyed length, {:f} m to {:f} m, reaches out of {n}", "die zerstörte Länge, {} m bis {} m, reicht über {} hinaus"],
   ["{n} has another charge beside this one, not at the same height", "{} hat neben dieser noch eine Ladung, nicht in derselben Höhe"],
   ["{n} has another charge on the same length", "{} hat noch eine Ladung auf derselben Länge"],
+  ["residual_concrete: of concrete without strength (transition_damage) and no bars nothing is left", "residual_concrete: Von Beton ohne Festigkeit (transition_damage) und ohne Stäbe bleibt nichts"],
   ["{n} has another charge, and one leaves concrete", "{} hat eine weitere Ladung, und eine lässt Beton stehen"],
   ["{n}: time: is not after the stage before it", "{}: time: liegt nicht nach der Zündstufe davor"],
   ["time: the stage fires at or after the end of the analysis", "time: Die Zündstufe zündet am Ende der Rechnung oder danach"],
