@@ -7,7 +7,7 @@
 #include <map>
 #include <numbers>
 #include <set>
-#include <tuple>
+#include <utility>
 
 #include "base/utf8.h"
 #include "product/document.h"
@@ -50,6 +50,16 @@ std::string literal(const std::string& text) {
 
 std::string quantity(double value, const char* unit) { return fmt::format("\"{} {}\"", value, unit); }
 
+/// Places of the tables of a stage's charges in the text, in their order.
+std::vector<std::pair<int, int>> list_tables(const Stage& stage) {
+  std::vector<std::pair<int, int>> places;
+  for (const Charge& c : stage.charges)
+    if (const std::pair place{c.where.line, c.where.column};
+        std::find(places.begin(), places.end(), place) == places.end())
+      places.push_back(place);
+  return places;
+}
+
 class Editor {
  public:
   Editor(const Plan& plan, const PlanChanges& changes) : plan_(plan), changes_(changes) {
@@ -61,6 +71,8 @@ class Editor {
     std::vector<Diagnostic> warnings;
     before_ = read_plan(plan.text, plan.path, warnings);
   }
+
+  const Plan& before() const { return before_; }
 
   std::string run() {
     std::string behind;
@@ -186,11 +198,7 @@ class Editor {
   }
   /// Whether a table of charges keeps its number in its stage; of stages that do.
   bool keeps_charge(size_t stage, int number) const {
-    std::vector<std::pair<int, int>> places;  // of its tables, in their order
-    for (const Charge& c : before_.stages[stage].charges)
-      if (const std::pair place{c.where.line, c.where.column};
-          std::find(places.begin(), places.end(), place) == places.end())
-        places.push_back(place);
+    const std::vector<std::pair<int, int>> places = list_tables(before_.stages[stage]);
     const std::vector<Table> tables = lay_out((*changes_.stages)[stage]);
     const auto n = static_cast<size_t>(number);
     return n < places.size() && n < tables.size() &&
@@ -271,68 +279,71 @@ class Editor {
   std::set<int> heads_;
 };
 
-/// Of each charge of a stage the number of its table, from 0.
-std::vector<int> number_tables(const Stage& stage) {
-  std::map<std::pair<int, int>, int> numbers;  // by place; places rise with their numbers
-  for (const Charge& c : stage.charges) numbers[{c.where.line, c.where.column}] = 0;
-  int next = 0;
-  for (auto& entry : numbers) entry.second = next++;
-  std::vector<int> out;
-  for (const Charge& c : stage.charges) out.push_back(numbers[{c.where.line, c.where.column}]);
+/// A charge and where its table stands in the plan's document.
+struct NumberedCharge {
+  const Charge* charge = nullptr;
+  int stage = 0, table = 0;  // from 0
+};
+std::vector<NumberedCharge> number_charges(const Plan& plan) {
+  std::vector<NumberedCharge> out;
+  for (size_t s = 0; s < plan.stages.size(); ++s) {
+    const std::vector<std::pair<int, int>> tables = list_tables(plan.stages[s]);
+    for (const Charge& c : plan.stages[s].charges) {
+      const auto table = std::find(tables.begin(), tables.end(), std::pair{c.where.line, c.where.column});
+      out.push_back({&c, static_cast<int>(s), static_cast<int>(table - tables.begin())});
+    }
+  }
   return out;
+}
+
+bool is_same_place(const Charge& a, const Charge& b) {
+  const auto is_near = [](double x, double y) { return std::abs(x - y) <= 1e-9; };
+  return a.member == b.member && is_near(a.position, b.position) && is_near(a.azimuth, b.azimuth) &&
+         is_near(a.opening, b.opening);
 }
 
 /// What fuzzy values vary of charges they go on varying: one that has got a table of its own has a number of its own.
 void check_fuzzy_charges(const Plan& before, const Plan& after) {
-  using Key = std::tuple<int, int, std::string>;  // stage, number of the table, and what is varied of it
-  const auto key_of = [](const DocumentPath& p, int stage, int number) {
-    std::string rest;
-    for (size_t i = 4; i < p.size(); ++i) rest += fmt::format("{} {}.", p[i].key, p[i].item);
-    return Key{stage, number, rest};
-  };
   const auto is_of_charge = [](const DocumentPath& p) {
     return p.size() > 4 && p[0].key == "stage" && p[2].key == "charge";
   };
-  std::vector<std::vector<int>> old_numbers, new_numbers;
-  for (const Stage& s : before.stages) old_numbers.push_back(number_tables(s));
-  for (const Stage& s : after.stages) new_numbers.push_back(number_tables(s));
+  // the path of the same value of another charge
+  const auto text_of = [](DocumentPath p, const NumberedCharge& c) {
+    p[1].item = c.stage, p[3].item = c.table;
+    std::string text;
+    for (const DocumentStep& step : p) text += fmt::format("{} {}.", step.key, step.item);
+    return text;
+  };
+  const std::vector<NumberedCharge> old = number_charges(before), now = number_charges(after);
   for (size_t i = 0; i < before.fuzzy.places.size(); ++i) {
-    std::set<Key> varied;
+    std::set<std::string> varied;
     for (const DocumentPath& p : after.fuzzy.places[i])
-      if (is_of_charge(p)) varied.insert(key_of(p, p[1].item, p[3].item));
-    for (const DocumentPath& p : before.fuzzy.places[i]) {
-      if (!is_of_charge(p)) continue;
-      const size_t s = static_cast<size_t>(p[1].item);
-      for (size_t c = 0; c < before.stages[s].charges.size(); ++c) {
-        if (old_numbers[s][c] != p[3].item) continue;
-        const Charge& old = before.stages[s].charges[c];
-        for (size_t t = 0; t < after.stages.size(); ++t)
-          for (size_t d = 0; d < after.stages[t].charges.size(); ++d) {
-            const Charge& now = after.stages[t].charges[d];
-            const bool is_other = now.member != old.member || std::abs(now.position - old.position) > 1e-9 ||
-                                  std::abs(now.azimuth - old.azimuth) > 1e-9 ||
-                                  std::abs(now.opening - old.opening) > 1e-9;
-            if (is_other || now.fails) continue;
-            // a delay that has been set is meant
-            if (p.back().key == "delay" && now.delay != old.delay) continue;
-            if (!varied.contains(key_of(p, static_cast<int>(t), new_numbers[t][d])))
-              refuse(
-                  fmt::format("[fuzzy] varies the charge on {} together with others by their number; a path with "
-                              "\"*\" would go on doing so",
-                              before.members[static_cast<size_t>(old.member)].name));
-          }
+      if (is_of_charge(p)) varied.insert(text_of(p, {nullptr, p[1].item, p[3].item}));
+    const auto check = [&](const DocumentPath& p, const Charge& was) {
+      for (const NumberedCharge& c : now) {
+        if (c.charge->fails || !is_same_place(*c.charge, was)) continue;
+        // a delay that has been set is meant
+        if (p.back().key == "delay" && c.charge->delay != was.delay) continue;
+        if (!varied.contains(text_of(p, c)))
+          refuse(
+              fmt::format("[fuzzy] varies the charge on {} together with others by their number; a path with \"*\" "
+                          "would go on doing so",
+                          before.members[static_cast<size_t>(was.member)].name));
       }
-    }
+    };
+    for (const DocumentPath& p : before.fuzzy.places[i])
+      for (const NumberedCharge& c : old)
+        if (is_of_charge(p) && p[1].item == c.stage && p[3].item == c.table) check(p, *c.charge);
   }
 }
 
 }  // namespace
 
 std::string write_changes(const Plan& plan, const PlanChanges& changes) {
-  std::string text = Editor(plan, changes).run();
+  Editor editor(plan, changes);
+  std::string text = editor.run();
   std::vector<Diagnostic> warnings;
-  const Plan before = read_plan(plan.text, plan.path, warnings), after = read_plan(text, plan.path, warnings);
-  check_fuzzy_charges(before, after);
+  check_fuzzy_charges(editor.before(), read_plan(text, plan.path, warnings));
   return text;
 }
 
