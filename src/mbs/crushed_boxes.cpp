@@ -133,24 +133,29 @@ void System::shorten_boxes() {
   }
 }
 
-double System::calc_end_bearing(size_t b, int shape, const Vec3& outward, double way) const {
+const CrushedBox* System::find_met_end(size_t b, int shape, const Vec3& outward) const {
   constexpr double kHeadOn = 0.7;  // cosine of the angle between the member and the normal up to which its end is met
-  if (b == B) return kUnlimited;
+  if (b == B) return nullptr;
   const CompiledShape& s = state.shapes[static_cast<size_t>(shape)];
-  if (s.crushed < 0) return kUnlimited;
+  if (s.crushed < 0) return nullptr;
   const CrushedBox& box = state.crushed_boxes[static_cast<size_t>(s.crushed)];
-  if (box.taken >= box.most || box.end * dot(state.R[b] * s.R_BS.column(box.axis), outward) < kHeadOn)
-    return kUnlimited;
-  const size_t e = static_cast<size_t>(box.element);
+  const bool is_met = box.end * dot(state.R[b] * s.R_BS.column(box.axis), outward) >= kHeadOn;
+  return is_met && box.taken < box.most ? &box : nullptr;
+}
+
+double System::calc_end_bearing(const CrushedBox* box, double way) const {
+  if (box == nullptr) return kUnlimited;
+  const size_t e = static_cast<size_t>(box->element);
   const CompiledLaw& law = laws[static_cast<size_t>(find_ruling_law(elements[e].zone, state.element[e]))];
-  const double from = box.begin + box.taken;
+  const double from = box->begin + box->taken;
   // it meets what it meets at full speed, and its peak may be as narrow as the way between two looks
   return calc_mean(law.compression, from, from + (law.keeps_length ? way : 0));
 }
 
 double System::crush_ends(size_t a, int shape_a, size_t b, int shape_b, const Vec3& n, const ContactLaw& law,
                           size_t first, double h) {
-  if (std::min(calc_end_bearing(a, shape_a, n, 0), calc_end_bearing(b, shape_b, -n, 0)) == kUnlimited) return 0;
+  const CrushedBox *end_a = find_met_end(a, shape_a, n), *end_b = find_met_end(b, shape_b, -n);
+  if (end_a == nullptr && end_b == nullptr) return 0;
   State& s = state;
   const std::span<ContactPoint> points = std::span(contact.point).subspan(first);
   const bool is_ground = b == B;
@@ -163,7 +168,7 @@ double System::crush_ends(size_t a, int shape_a, size_t b, int shape_b, const Ve
   };
   double way = 0;  // until the next look
   for (const ContactPoint& p : points) way = std::max(way, contact_interval * h * speed_of(p));
-  const double bears_a = calc_end_bearing(a, shape_a, n, way), bears_b = calc_end_bearing(b, shape_b, -n, way);
+  const double bears_a = calc_end_bearing(end_a, way), bears_b = calc_end_bearing(end_b, way);
   const double bears = std::min(bears_a, bears_b);
   // force over depth, and its growth in a step
   const auto rate_of = [&](const ContactPoint& p, double speed) {

@@ -73,8 +73,8 @@ struct ZoneElement {
   double damping_ratio = 0.05;    // share of critical damping at Model::damping_frequency, 0 to 0.2
   std::vector<Station> stations;  // none: elastic; at most two
   // Length over which the member can be crushed, one zone after the other, where that is more than the law's
-  // crush_length; boxes along it get shorter with it. A law that buckles or keeps_length
-  // keeps its own. [m]
+  // crush_length; boxes along it get shorter with it. A law that buckles or
+  // keeps_length keeps its own. [m]
   double crush_through = 0;
   Cracking cracking[2];  // of each station, about y and about z
 };

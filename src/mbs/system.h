@@ -669,11 +669,14 @@ class System {
   void number_crushed_boxes();
   /// As short as an element's shortening leaves it [m].
   void shorten_shape(CrushedBox&, double shortening);
-  /// What the end of a member bears against a surface with this normal out of body b [N]; unlimited for other shapes
-  /// and where the member is not met head on.
   /// How much of its boxes is gone with a weak length that was crushed through; 0: none was [m].
   double calc_crushed_through(size_t element) const;
-  double calc_end_bearing(size_t b, int shape, const Vec3& outward, double way) const;
+  /// The end of a member that a surface with this normal out of body b meets head on; null: of other shapes, and where
+  /// nothing is left of it, none.
+  const CrushedBox* find_met_end(size_t b, int shape, const Vec3& outward) const;
+  /// What it bears [N]; unlimited for none.
+  ///   way  by which it comes nearer until points are looked for again [m]
+  double calc_end_bearing(const CrushedBox*, double way) const;
   /// Crushes the weaker of two ends that meet, or one that meets something, as far as it bears less than what presses
   /// there: its box gets shorter and the points come out by as much, which is returned [m].
   ///   b      B: the ground
