@@ -46,6 +46,12 @@ inline int find_nearer_station(const MemberZones& z, double at) {
   return std::abs(at - z.station[1].at) < std::abs(at - z.station[0].at) - 1e-9 ? 1 : 0;
 }
 
+/// Whether a charge destroys a member as far as a station; a piece between them that is no longer than those that
+/// cut_member takes along goes too.
+inline bool reaches_station(const product::Charge& c, const MemberStation& station) {
+  return std::abs(c.position - station.at) < 0.5 * c.destroyed_length + kSliver;
+}
+
 /// Sectors of a shaft that hold together at a level, about their own centroid.
 struct ShaftElement {
   nearfield::RingInput ring;        // angles from its azimuth
@@ -196,6 +202,15 @@ struct Builder : BuilderState {
   mbs::LawId stub_law_of(int zone, const Stiffness&, int member, double length);
   /// What a charge leaves of a member where some of its concrete stays.
   mbs::LawId partial_law_of(const Firing&, const MemberZones&, size_t station);
+  /// The limits of an element, or a rotational one, go over to those of a law as its charge fires.
+  mbs::Action make_switch(mbs::LawId law, double stiffness_share = 1) const {
+    mbs::Action act;
+    act.kind = mbs::Action::Kind::SwitchLaw;
+    act.ramp = k.charge_release_time;
+    act.law = law;
+    act.stiffness_share = stiffness_share;
+    return act;
+  }
   void make_stub(const product::Charge&, const MemberZones&, mbs::Event& event, mbs::Event& lighter);
   Pose frame_in(int body, const Vec3& p_W, const Mat3& R_WF) const;
   mbs::ElementId add_element(const std::string& name, int member, int a, int b, const Vec3& p_W, const Mat3& R_WF,

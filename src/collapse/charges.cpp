@@ -73,12 +73,11 @@ void Builder::make_stub(const product::Charge& c, const MemberZones& z, mbs::Eve
   const MemberStation& top = z.station[1];
   const double length = z.clear_length - upper_end(c);
   if (!(length > 0)) return;
-  mbs::Action act;
-  act.kind = mbs::Action::Kind::SwitchLaw;
+  // it turns about its own end alone
+  mbs::Action act =
+      make_switch(stub_law_of(top.damaged >= 0 ? top.damaged : top.zone, calc_stiffness(z), c.member, length),
+                  1 / (z.lever[1].moment_z * z.lever[1].rotation));
   act.rotational = z.rotational;
-  act.ramp = k.charge_release_time;
-  act.stiffness_share = 1 / (z.lever[1].moment_z * z.lever[1].rotation);  // it turns about its own end alone
-  act.law = stub_law_of(top.damaged >= 0 ? top.damaged : top.zone, calc_stiffness(z), c.member, length);
   event.actions.push_back(act);
   act = {};
   act.kind = mbs::Action::Kind::LoosenJoint;
@@ -243,11 +242,6 @@ void Builder::add_events(std::vector<Firing> schedule) {
     const double to = m.start[axis] + c.position + 0.5 * c.destroyed_length;
     const bool is_beam = m.kind == MemberKind::Beam, is_partial = c.residual_concrete > 0;
     int which = is_beam ? find_nearer_station(z, c.position) : 0;
-    // a piece between a gap and a joint that is no longer than those that cut_member takes along
-    const auto reaches = [&](int end) {
-      return std::abs(c.position - z.station[static_cast<size_t>(end)].at) < 0.5 * c.destroyed_length + kSliver;
-    };
-
     mbs::Event event;
     event.name = m.name;
     // concrete and stiffness go together, when the ramp of the limits is over
@@ -269,27 +263,27 @@ void Builder::add_events(std::vector<Firing> schedule) {
     }
     for (const int end : {0, 1}) {
       const int reached = z.element[end];
-      if (is_shaft || (end != which && !(is_beam && reached != element && reaches(end)))) continue;
+      if (is_shaft ||
+          (end != which && !(is_beam && reached != element && reaches_station(c, z.station[static_cast<size_t>(end)]))))
+        continue;
       const auto it = weakest.find(reached);
       if (it != weakest.end() && !leaves_less(c, *it->second)) continue;
       weakest[reached] = &c;
       mbs::Action act;
-      act.kind = mbs::Action::Kind::SwitchLaw;
-      act.element = mbs::ElementId{reached};
-      act.ramp = k.charge_release_time;
       if (is_partial) {
-        act.law = partial_law_of(firing, z, static_cast<size_t>(end));
+        act = make_switch(partial_law_of(firing, z, static_cast<size_t>(end)));
       } else {
         const nearfield::ZoneInput& in = library.input(z.station[static_cast<size_t>(end)].zone);
         const nearfield::ResidualCage cage = make_residual_cage(in, c.destroyed_length, c.residual_bars);
         const auto key = std::make_tuple(reached, c.destroyed_length, c.residual_bars, c.position);
         if (!cage_laws.count(key))
           cage_laws[key] = mbs::add_law(model, make_cage_law(cage, c.destroyed_length, m.name + "/charge", k));
-        act.law = cage_laws[key];
         // bars alone are as soft as they are long
         const double before = model.elements[static_cast<size_t>(reached)].translational_stiffness.x;
-        act.stiffness_share = std::clamp(cage.EA / (c.destroyed_length * before), kLeastStiffnessShare, 1.0);
+        act =
+            make_switch(cage_laws[key], std::clamp(cage.EA / (c.destroyed_length * before), kLeastStiffnessShare, 1.0));
       }
+      act.element = mbs::ElementId{reached};
       event.actions.push_back(act);
       ZoneEntry& zone = map.elements[static_cast<size_t>(reached)];
       double& time = is_partial ? zone.weakening_time : zone.firing_time;
@@ -305,11 +299,9 @@ void Builder::add_events(std::vector<Firing> schedule) {
 
     // the hinge of a column that is not wholly destroyed stays
     if (is_partial && z.rotational >= 0 && z.station[1].damaged >= 0) {
-      mbs::Action act;
-      act.kind = mbs::Action::Kind::SwitchLaw;
+      mbs::Action act =
+          make_switch(hinge_law_of(z.station[1].damaged, calc_stiffness(z), m.name + "/transition", z.lever[1]));
       act.rotational = z.rotational;
-      act.ramp = k.charge_release_time;
-      act.law = hinge_law_of(z.station[1].damaged, calc_stiffness(z), m.name + "/transition", z.lever[1]);
       event.actions.push_back(std::move(act));
     }
 
@@ -322,11 +314,8 @@ void Builder::add_events(std::vector<Firing> schedule) {
       if (z.element[other] >= 0 && z.element[other] != element) {
         weakens = true;
         if (weakest.count(z.element[other])) continue;  // it has fired, and stays
-        mbs::Action act;
-        act.kind = mbs::Action::Kind::SwitchLaw;
+        mbs::Action act = make_switch(law_of(station.damaged, calc_stiffness(z), m.name + "/transition"));
         act.element = mbs::ElementId{z.element[other]};
-        act.ramp = k.charge_release_time;
-        act.law = law_of(station.damaged, calc_stiffness(z), m.name + "/transition");
         event.actions.push_back(act);
       }
     }

@@ -157,7 +157,7 @@ void Builder::request_station(int index, int which) {
       const product::Charge& c = plan.stages[stage].charges[i];
       if (c.member != index || c.fails) continue;
       const bool acts_here = which == (is_column ? 0 : find_nearer_station(z, c.position));
-      if (c.residual_concrete > 0 && (acts_here || !is_column))
+      if (c.residual_concrete > 0 && (acts_here || (!is_column && reaches_station(c, station))))
         partial_zones[{static_cast<int>(stage), static_cast<int>(i), which}] =
             library.request(nearfield::make_partial_zone(
                 prepared, {c.destroyed_length, c.residual_bars, c.transition_damage, c.residual_concrete}));

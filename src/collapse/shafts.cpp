@@ -585,12 +585,8 @@ void Builder::fire_shaft(const Firing& firing, mbs::Event& event, mbs::Event& li
     for (ShaftElement& e : joint.elements) {
       if (e.element < 0 || !is_here) continue;
       const auto switch_to = [&](mbs::LawId law, double share) {
-        mbs::Action act;
-        act.kind = mbs::Action::Kind::SwitchLaw;
+        mbs::Action act = make_switch(law, share);
         act.element = mbs::ElementId{e.element};
-        act.ramp = k.charge_release_time;
-        act.law = law;
-        act.stiffness_share = share;
         event.actions.push_back(act);
       };
       const auto key = std::make_tuple(e.element, c.destroyed_length, c.residual_bars, c.position);

@@ -226,9 +226,7 @@ TEST(ImportIfcBoxes, OfRoundMeshesHoldCirclesOnly) {
          {-0.2, 0.107},
          {-0.2, -0.107},
          {-0.107, -0.107}}}) {
-    const Import made = made_of(outline);
-    EXPECT_THAT(made.report.missing, Contains("1 x COLUMN: its body is a mesh that is no upright box"));
-    EXPECT_THAT(made.report.taken, Contains("4 columns in 1 section"));
+    EXPECT_THAT(made_of(outline).report.missing, Contains("1 x COLUMN: its body is a mesh that is no upright box"));
   }
 }
 
