@@ -1,12 +1,11 @@
 /// Dead-load equilibrium by Newton's method with the elastic stiffness, joints by the augmented Lagrangian; and the
-/// stiffest mode by Lanczos' method (docs/theory/multibody.md, eq. 8 to 10). The one place of the module that sees
-/// sparse matrices.
+/// stiffest mode by Lanczos' method (docs/theory/multibody.md, eq. 8 to 10). With stiffness_factor.h the
+/// one place of the module that sees sparse matrices.
 
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Sparse>
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,6 +17,8 @@
 #include "mbs/acceleration.h"
 #include "mbs/contact_kernel.h"
 #include "mbs/joint_rows.h"
+#include "mbs/sparse_kernel.h"
+#include "mbs/stiffness_factor.h"
 #include "mbs/system.h"
 #include "mbs/zone_limits.h"
 
@@ -41,11 +42,11 @@ struct KinematicRow {
 
 /// Which coordinate of a free body is which unknown: all six, or x, z and the turn about y.
 struct Unknowns {
-  explicit Unknowns(bool is_planar) : each(is_planar ? 3 : 6), stride(is_planar ? 2 : 1) {}
+  explicit constexpr Unknowns(bool is_planar) : each(is_planar ? 3 : 6), stride(is_planar ? 2 : 1) {}
   int each, stride;
-  int at(int place, int unknown) const { return each * place + unknown; }
+  constexpr int at(int place, int unknown) const { return each * place + unknown; }
   /// Of the body's coordinates x y z, about x y z.
-  int coordinate(int unknown) const { return stride * unknown; }
+  constexpr int coordinate(int unknown) const { return stride * unknown; }
 };
 
 /// Of the same two bodies.
@@ -72,7 +73,7 @@ void add_outer(const KinematicRow& r, double k, const Unknowns& u, Triplets& out
 /// included, so it never changes with the numbers.
 class PairMatrix {
  public:
-  using Block = double[12][12];  // both bodies' coordinates: x y z, about x y z
+  using Block = double[12][12];  // by columns; both bodies' coordinates: x y z, about x y z
 
   PairMatrix(int bodies, const Unknowns& u) : u_(u), near_(static_cast<size_t>(bodies)) {}
   /// First all pairs of places, -1 for held bodies ...
@@ -86,7 +87,10 @@ class PairMatrix {
     for (std::vector<int>& list : near_) {
       std::sort(list.begin(), list.end());
       list.erase(std::unique(list.begin(), list.end()), list.end());
+      first_.push_back(static_cast<std::uint32_t>(rows_.size()));
+      rows_.insert(rows_.end(), list.begin(), list.end());
     }
+    first_.push_back(static_cast<std::uint32_t>(rows_.size()));
     const int columns = each * bodies;
     matrix_.resize(columns, columns);
     size_t count = 0;
@@ -102,62 +106,50 @@ class PairMatrix {
     outer[columns] = at;
     std::fill_n(matrix_.valuePtr(), count, 0.0);
   }
-  void add(int a, int b, const Block& sum) {
-    const int body[2] = {a, b}, each = u_.each;
-    for (int j = 0; j < 2; ++j) {
-      if (body[j] < 0) continue;
-      const std::vector<int>& list = near_[static_cast<size_t>(body[j])];
-      for (int i = 0; i < 2; ++i) {
-        if (body[i] < 0) continue;
-        const auto place = std::lower_bound(list.begin(), list.end(), body[i]) - list.begin();
-        for (int n = 0; n < each; ++n) {
-          double* to = matrix_.valuePtr() + matrix_.outerIndexPtr()[u_.at(body[j], n)] + each * place;
-          for (int m = 0; m < each; ++m) to[m] += sum[6 * i + u_.coordinate(m)][6 * j + u_.coordinate(n)];
-        }
-      }
-    }
-  }
+  void add(int a, int b, const Block& sum) { u_.each == 6 ? add_blocks<6>(a, b, sum) : add_blocks<3>(a, b, sum); }
   /// Hands the matrix over, which a return value would copy.
   void move_to(Sparse& other) { other.swap(matrix_); }
   /// Times a vector, in the order in which Sparse sums.
-  void times(const Vector& x, Vector& y) const { u_.each == 6 ? times_by<6>(x, y) : times_by<3>(x, y); }
+  void times(const Vector& x, Vector& y) const {
+    y.setZero(x.size());
+    kernel::add_product({static_cast<size_t>(u_.each), near_.size(), first_.data(), rows_.data(), matrix_.valuePtr(),
+                         x.data(), y.data()});
+  }
 
  private:
   template <int Each>
-  void times_by(const Vector& x, Vector& y) const {
-    y.setZero(x.size());
-    const double* block = matrix_.valuePtr();
-    for (size_t j = 0; j < near_.size(); ++j) {
-      const std::vector<int>& list = near_[j];
-      const size_t stride = Each * list.size();  // from column to column
-      const double* from = x.data() + Each * j;
-      for (const int i : list) {
-        double sum[Each];
-        double* to = y.data() + Eigen::Index{Each} * i;
-        for (int m = 0; m < Each; ++m) sum[m] = to[m];
-        for (size_t n = 0; n < Each; ++n)
-          for (size_t m = 0; m < Each; ++m) sum[m] += block[n * stride + m] * from[n];
-        for (int m = 0; m < Each; ++m) to[m] = sum[m];
-        block += Each;
+  void add_blocks(int a, int b, const Block& sum) {
+    constexpr Unknowns u(Each == 3);
+    const int body[2] = {a, b};
+    for (int j = 0; j < 2; ++j) {
+      if (body[j] < 0) continue;
+      const std::vector<int>& list = near_[static_cast<size_t>(body[j])];
+      double* const columns = matrix_.valuePtr() + matrix_.outerIndexPtr()[u.at(body[j], 0)];
+      for (int i = 0; i < 2; ++i) {
+        if (body[i] < 0) continue;
+        const auto place = std::lower_bound(list.begin(), list.end(), body[i]) - list.begin();
+        double* to = columns + Each * place;
+        for (int n = 0; n < Each; ++n, to += Each * list.size())
+          for (int m = 0; m < Each; ++m) to[m] += sum[6 * j + u.coordinate(n)][6 * i + u.coordinate(m)];
       }
-      block += (Each - 1) * stride;
     }
   }
+
   Unknowns u_;
   std::vector<std::vector<int>> near_;  // of each body, those whose rows its columns have
+  std::vector<std::uint32_t> first_;    // the same, one after the other
+  std::vector<int> rows_;
   Sparse matrix_;
 };
 
-/// Adds k times a row's outer product.
-void add_outer(const KinematicRow& r, double k, PairMatrix::Block& sum) {
-  const Vec3* part[4] = {&r.va, &r.wa, &r.vb, &r.wb};
-  double x[12];
-  for (int i = 0; i < 12; ++i) x[i] = (*part[i / 3])[i % 3];
-  for (int i = 0; i < 12; ++i) {
-    if (x[i] == 0) continue;
-    const double y = k * x[i];
-    for (int j = 0; j < 12; ++j) sum[i][j] += y * x[j];
+/// Adds the outer products of rows of the same two bodies, at most six, each times its k.
+void add_outer(const KinematicRow* rows, const double* k, size_t count, PairMatrix::Block& sum) {
+  double x[kernel::kMostOuterProducts][12];
+  for (size_t r = 0; r < count; ++r) {
+    const Vec3* part[4] = {&rows[r].va, &rows[r].wa, &rows[r].vb, &rows[r].wb};
+    for (int i = 0; i < 12; ++i) x[r][i] = (*part[i / 3])[i % 3];
   }
+  kernel::add_outer_products(&x[0][0], k, count, &sum[0][0]);
 }
 
 /// Upper bound of the frequencies with which the points that touch swing their bodies [rad/s].
@@ -303,14 +295,15 @@ class Assembly {
         soften_plane(e.zone, share, q, cracked.data(), plane);
         for (double& k : plane) k *= factor;
         stiffness[shear] = plane[0] - plane[1], stiffness[bend] = plane[2] - plane[1];
-        add_outer(sum_of(rows[shear], rows[bend]), plane[1], block);
+        const KinematicRow both = sum_of(rows[shear], rows[bend]);
+        add_outer(&both, &plane[1], 1, block);
       }
-      for (int k = 0; k < 6; ++k) add_outer(rows[k], stiffness[k], block);
+      add_outer(rows, stiffness, 6, block);
       sum.add(rows[0].a, rows[0].b, block);
     });
     each_row([&](const KinematicRow& r, double stiffness) {
       PairMatrix::Block block = {};
-      add_outer(r, stiffness, block);
+      add_outer(&r, &stiffness, 1, block);
       sum.add(r.a, r.b, block);
     });
     return sum;
@@ -430,7 +423,8 @@ double System::find_highest_frequency(bool is_present) const {
   } else {
     // inertia against what joints hold, so large that nothing of it moves
     const Sparse M = assembly.make_held_mass(inertia);
-    const Eigen::SimplicialLDLT<Sparse> factor(M);
+    StiffnessFactor factor;
+    factor.factorise(M);
     omega2 = find_largest_eigenvalue(
         assembly.make_stiffness(true, 1, false), n, [&](const Vector& x, Vector& y) { y = factor.solve(x); },
         [&](const Vector& x, Vector& y) { y = M * x; });
@@ -543,34 +537,6 @@ void System::choose_step() {
   summary.step = step;
   summary.highest_frequency = highest_frequency;
 }
-
-/// LDLᵀ of a symmetric matrix. The order of elimination is looked for where the pattern is not that of before.
-class StiffnessFactor {
- public:
-  /// False: a pivot is zero.
-  bool factorise(const Sparse& K) {
-    const int *first = K.outerIndexPtr(), *row = K.innerIndexPtr();
-    const auto columns = K.outerSize(), values = K.nonZeros();
-    const auto is_same = [](const std::vector<int>& known, const int* begin, Eigen::Index count) {
-      return std::equal(known.begin(), known.end(), begin, begin + count);
-    };
-    if (!is_same(first_, first, columns + 1) || !is_same(row_, row, values)) {
-      solver_.analyzePattern(K);
-      first_.assign(first, first + columns + 1);
-      row_.assign(row, row + values);
-    }
-    solver_.factorize(K);
-    return solver_.info() == Eigen::Success;
-  }
-  Vector solve(const Vector& b) const { return solver_.solve(b); }
-  Vector diagonal() const { return solver_.vectorD(); }
-  /// Whose pivot stands at a place of the diagonal.
-  Eigen::Index unknown_of(Eigen::Index pivot) const { return solver_.permutationPinv().indices()[pivot]; }
-
- private:
-  Eigen::SimplicialLDLT<Sparse> solver_;
-  std::vector<int> first_, row_;  // of the matrix by columns
-};
 
 std::shared_ptr<StiffnessFactor> make_stiffness_factor() { return std::make_shared<StiffnessFactor>(); }
 
@@ -753,7 +719,7 @@ bool DeadLoad::factorise(std::string& message) {
     message = "the stiffness matrix of the dead-load equilibrium could not be factorised: the model is a mechanism";
     return false;
   }
-  const Vector D = factor_->diagonal();
+  const Vector& D = factor_->diagonal();
   Eigen::Index worst = 0;
   const double least = D.minCoeff(&worst);
   if (is_regular && least > 1e-13 * D.maxCoeff()) return true;
@@ -1148,7 +1114,7 @@ DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
     find_cracks(by_tangents);
     secants = std::max(0, secants - 1);
     s_.state.element = virgin_;
-    if (round == 0 || steps == Steps::Accelerated ||
+    if (factorised == 0 || steps == Steps::Accelerated ||
         (factorised < (has_cracks_ ? fresh_by_cracks : fresh) && unbalanced_ > good_enough &&
          unbalanced_ > quick * last_unbalanced)) {
       ++factorised;

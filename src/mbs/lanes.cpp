@@ -1,9 +1,9 @@
 #include "mbs/lanes.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <cstring>
 #include <limits>
-#include <string_view>
-#include <unordered_map>
 
 #include "mbs/contact_kernel.h"
 #include "mbs/ground_kernel.h"
@@ -193,25 +193,46 @@ void Lanes::drop_dead_entries() {
 }
 
 void Lanes::share_again() {
-  if (uses.size() > 2 * shared + 64) share_constants();
+  if (uses.size() > 2 * shared + 512) share_constants();
 }
+
+namespace {
+
+/// Of the bytes of doubles.
+std::uint64_t calc_hash(const double* x, size_t count) {
+  std::uint64_t hash = 0;
+  for (size_t l = 0; l < count; ++l) {
+    std::uint64_t bits;
+    std::memcpy(&bits, x + l, sizeof bits);
+    hash = (hash ^ bits) * 0x9e3779b97f4a7c15ULL;
+    hash ^= hash >> 32;
+  }
+  return hash;
+}
+
+}  // namespace
 
 void Lanes::share_constants() {
   AlignedVector<double> merged;
   std::vector<std::uint32_t> counts, moved(uses.size(), kNoSlot);
-  std::unordered_map<std::string_view, std::uint32_t> known;  // by the bytes of the old pool
+  // vectors of `merged` by the hash of their bytes, with open addressing
+  size_t places = 64;
+  while (places < 2 * uses.size()) places *= 2;
+  std::vector<std::uint32_t> known(places, kNoSlot);
   const size_t size = W * sizeof(double);
-  for (std::uint32_t& entry : constants) {
-    if (moved[entry] == kNoSlot) {
-      const double* from = pool.data() + size_t{entry} * W;
-      const auto [it, is_new] = known.emplace(std::string_view(reinterpret_cast<const char*>(from), size),
-                                              static_cast<std::uint32_t>(counts.size()));
-      if (is_new) {
-        merged.insert(merged.end(), from, from + W);
-        counts.push_back(0);
-      }
-      moved[entry] = it->second;
+  const auto find = [&](const double* x) {
+    size_t place = calc_hash(x, W) & (places - 1);
+    while (known[place] != kNoSlot && std::memcmp(merged.data() + size_t{known[place]} * W, x, size) != 0)
+      place = (place + 1) & (places - 1);
+    if (known[place] == kNoSlot) {
+      known[place] = static_cast<std::uint32_t>(counts.size());
+      merged.insert(merged.end(), x, x + W);
+      counts.push_back(0);
     }
+    return known[place];
+  };
+  for (std::uint32_t& entry : constants) {
+    if (moved[entry] == kNoSlot) moved[entry] = find(pool.data() + size_t{entry} * W);
     entry = moved[entry];
     ++counts[entry];
   }

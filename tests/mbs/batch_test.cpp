@@ -210,22 +210,30 @@ TEST(Batch, SampleThatEndsEarlyDisturbsNoOther) {
 }
 
 TEST(Batch, EquilibriaOneAfterTheOtherAreThoseOfRunsAlone) {
-  const Model base = test::make_tower();
+  Model base = test::make_tower();
+  for (int b = 0; b < static_cast<int>(base.bodies.size()); ++b) {
+    Load l;
+    l.name = "lift of " + std::to_string(b), l.body = {b};
+    base.loads.push_back(l);
+  }
   std::vector<Variation> variations;
-  for (int i = 0; i < 5; ++i)
+  for (int i = 0; i < 6; ++i)
     variations.push_back([i](Model& m) {
       m.bodies[2].mass *= 1 + 0.1 * i;
       if (i == 1) m.gravity.z *= 1000;       // more than it bears
       if (i == 2) m.bodies[1].fixed = true;  // other unknowns
       if (i == 3)
         for (ZoneElement& e : m.elements) e.translational_stiffness.x *= 0.5;
+      if (i == 5)  // all but balanced from the start
+        for (Load& l : m.loads)
+          l.force.z = -(1 - 1e-8) * m.gravity.z * m.bodies[static_cast<size_t>(l.body.index)].mass;
     });
   Options run_options = make_options();
   run_options.equilibrium = true;
   run_options.duration = 0.2;
-  std::vector<std::uint64_t> alone(5), together(5);
+  std::vector<std::uint64_t> alone(6), together(6);
   std::vector<Summary> ends;
-  for (size_t i = 0; i < 5; ++i) {
+  for (size_t i = 0; i < 6; ++i) {
     Model m = base;
     variations[i](m);
     Options o = run_options;
@@ -237,7 +245,7 @@ TEST(Batch, EquilibriaOneAfterTheOtherAreThoseOfRunsAlone) {
   o.on_frame = [&](size_t i, const View& v) { together[i] = test::hash_of(v); };
   const std::vector<Summary> out = run_batch(base, variations, o);
   EXPECT_EQ(together, alone);
-  for (size_t i = 0; i < 5; ++i) {
+  for (size_t i = 0; i < 6; ++i) {
     EXPECT_EQ(out[i].ending, i == 1 ? Summary::Ending::NoEquilibrium : Summary::Ending::TimeLimit) << out[i].message;
     EXPECT_EQ(out[i].message, ends[i].message);
     EXPECT_EQ(out[i].equilibrium_residual, ends[i].equilibrium_residual);
