@@ -56,6 +56,19 @@ BlockFrame find_block(const std::vector<BlockFrame>& frames, double time) {
   return at;
 }
 
+/// Where a block leans, which a twist about its own axis or the vertical one is no part of.
+struct Lean {
+  explicit Lean(const Quat& rotation) {
+    const Mat3 R = to_matrix(rotation);
+    top = {R(0, 2), R(1, 2) + 0.0, 0};  // towards 180 deg, not -180
+    lowest = {-R(2, 0), -R(2, 1), 0};
+    tilt = std::atan2(norm(top), R(2, 2));
+  }
+  Vec3 top;     // horizontal part of where its vertical axis points
+  Vec3 lowest;  // horizontal direction in the upright block that comes down most, as long
+  double tilt;  // [rad]
+};
+
 /// Distance from the origin to where a ray leaves a convex polygon around it, counter-clockwise; 0 without one.
 double calc_reach(const Polygon& outline, const Vec3& direction) {
   double reach = std::numeric_limits<double>::infinity();
@@ -151,18 +164,17 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   const bool is_in_pieces = at.connected < k.mechanism_coherent_share;
   const BlockFrame::Motion whole =
       is_in_pieces ? at.pieces : BlockFrame::Motion{at.rotation, at.displacement, at.above};
-  const Vec3 turned = log_rotation(whole.rotation);
-  Vec3 direction = in.fall_direction;
-  const Vec3 lean = cross({turned.x, turned.y, 0}, {0, 0, 1});
-  const bool leans = norm(lean) > 1e-3;
-  if (leans) direction = (1 / norm(lean)) * lean;
-  out.tilt = norm(Vec3{turned.x, turned.y, 0});
+  const Lean lean(whole.rotation);
+  Vec3 direction = in.fall_direction, lowest = direction;
+  const bool leans = norm(lean.top) > 1e-3;
+  if (leans) direction = (1 / norm(lean.top)) * lean.top, lowest = (1 / norm(lean.lowest)) * lean.lowest;
+  out.tilt = lean.tilt;
   const Mat3 R = to_matrix(whole.rotation);
   const auto drop_of = [&](const Vec3& arm) { return -(whole.displacement + R * arm - arm).z; };
   const auto share_at = [&](double below) {
     const Vec3 down{0, 0, -below};
-    const double front = drop_of(calc_reach(in.outline, direction) * direction + down);
-    const double rear = drop_of(-calc_reach(in.outline, -direction) * direction + down);
+    const double front = drop_of(calc_reach(in.outline, lowest) * lowest + down);
+    const double rear = drop_of(-calc_reach(in.outline, -lowest) * lowest + down);
     return front > 1e-3 ? std::max(0.0, rear) / front : 1;
   };
   out.drop = -whole.displacement.z;
@@ -187,7 +199,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
       when, out.tilt / unit::deg, out.drop, 100 * out.rear_share, in.is_under_way ? "So far" : "In the end",
       100 * out.moved);
   const double height_left = in.frames.front().height > 0 ? last.height / in.frames.front().height : 1;
-  const double final_tilt = norm(log_rotation(last.rotation));
+  const double final_tilt = Lean(last.rotation).tilt;
   // of the largest connected part of the upper block, not of pieces that came off
   const double sunk = -last.displacement.z, aside = std::hypot(last.displacement.x, last.displacement.y);
   const bool has_left = !(calc_away(last, k) < 1) && last.connected >= k.mechanism_coherent_share;

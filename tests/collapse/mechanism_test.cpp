@@ -340,6 +340,45 @@ TEST(Mechanism, EdgesAreWhereItsLeanLeavesTheOutline) {
   EXPECT_NEAR(judge_mechanism(in, default_knowledge()).rear_share, rear / front, 1e-12);
 }
 
+TEST(Mechanism, ATwistIsNoPartOfTheLean) {
+  constexpr double tilt = 0.1, twist = 0.5, towards = 0.3;
+  const Vec3 lean = {std::cos(towards), std::sin(towards), 0};
+  const auto judge = [&](const Quat& rotation) {
+    MechanismInput in = synthetic(0, 0, 1);
+    in.fall_direction = lean;
+    in.is_direction_planned = true;
+    in.direction_tolerance = 0.01;
+    for (BlockFrame& f : in.frames) f.rotation = rotation, f.displacement = {0, 0, -1.0 * f.time};
+    return judge_mechanism(in, default_knowledge());
+  };
+  const Quat turn = exp_rotation(tilt * cross({0, 0, 1}, lean)), about_itself = exp_rotation({0, 0, twist});
+  const Mechanism plain = judge(turn), twisted = judge(turn * about_itself);
+  EXPECT_EQ(plain.name, "topple");
+  EXPECT_EQ(twisted.name, "topple");
+  for (const Mechanism* m : {&plain, &twisted}) {
+    EXPECT_NEAR(m->azimuth, towards, 1e-12);
+    EXPECT_NEAR(m->tilt, tilt, 1e-12);
+  }
+  // the edge that comes down most has turned with it
+  const double front = 6 / std::cos(towards - twist);
+  EXPECT_NEAR(twisted.rear_share, (1 - front * std::sin(tilt)) / (1 + front * std::sin(tilt)), 1e-12);
+  // about the vertical, after it has leant: it leans where that has turned its top
+  const Mechanism turned = judge(about_itself * turn);
+  EXPECT_NEAR(turned.azimuth, towards + twist, 1e-12);
+  EXPECT_NEAR(turned.tilt, tilt, 1e-12);
+  EXPECT_EQ(turned.name, "wrong direction");
+  EXPECT_NEAR(turned.rear_share, plain.rear_share, 1e-12);
+}
+
+TEST(Mechanism, AtRestItLeansByWhatIsNoTwist) {
+  MechanismInput in = synthetic(0, 0, 1);
+  in.came_to_rest = true;
+  in.frames.back().rotation = exp_rotation({0, 0.1, 0}) * exp_rotation({0, 0, 0.3});
+  in.frames.back().displacement = {0, 0, -1};
+  in.frames.back().height = 10;
+  EXPECT_THAT(judge_mechanism(in, default_knowledge()).text, testing::HasSubstr("leaning by 5.7 deg"));
+}
+
 TEST(Mechanism, WhatTopplesFallsTheWayItLeans) {
   MechanismInput in = synthetic(0.2, 0, 1);
   in.frames.back().centre = {6 + 0.5, 0.5, 4};  // its debris slides back and aside
