@@ -256,8 +256,7 @@ void System::hold_contacts() {
     };
     const auto factor_of = [&](int i) {
       const size_t b = static_cast<size_t>(t.held[static_cast<size_t>(i)].body);
-      const Mat3& I = state.body[b].inertia;
-      return Factor(mobility_of(i).left, std::sqrt(0.5 * state.body[b].inverse_mass * (I(0, 0) + I(1, 1) + I(2, 2))));
+      return Factor(mobility_of(i).left, std::sqrt(state.body[b].gyration2));
     };
     factors.clear();
     for (int i = first; i >= 0; i = next(i)) factors.push_back(factor_of(i));

@@ -673,10 +673,7 @@ double DeadLoad::calc_weight() const {
 double DeadLoad::calc_length() const {
   double sum = 0;
   int count = 0;
-  for (const int b : assembly_.free_bodies()) {
-    const BodyConstants& body = s_.state.body[static_cast<size_t>(b)];
-    sum += (body.inertia(0, 0) + body.inertia(1, 1) + body.inertia(2, 2)) * body.inverse_mass / 2, ++count;
-  }
+  for (const int b : assembly_.free_bodies()) sum += s_.state.body[static_cast<size_t>(b)].gyration2, ++count;
   for (const CompiledJoint& j : s_.joints) {
     const JointFrames f = calc_joint_frames(s_.state, j);
     for (const bool is_child : {false, true})

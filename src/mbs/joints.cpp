@@ -60,14 +60,12 @@ void lay_out(System& s, JointCluster& c) {
   double sum = 0, extent = 0;
   for (const int b : c.bodies) {
     const size_t body = static_cast<size_t>(b);
-    const BodyConstants& k = s.state.body[body];
-    const double gyration2 = 0.5 * k.inverse_mass * (k.inertia(0, 0) + k.inertia(1, 1) + k.inertia(2, 2));
     c.first_meeting.push_back(static_cast<int>(c.meetings.size()));
     for (const int place : at[body]) {
       const CompiledJoint& j = s.joints[static_cast<size_t>(c.joints[static_cast<size_t>(place)])];
       const bool is_child = j.child == b;
       const Vec3 lever = (is_child ? j.p_CM : j.p_PF) - s.state.p_offset[body];
-      sum += gyration2 + dot(lever, lever);
+      sum += s.state.body[body].gyration2 + dot(lever, lever);
       extent = std::max(extent, norm(s.model.bodies[body].X_WB.p) + norm(lever));
       c.meetings.push_back({place, is_child});
     }

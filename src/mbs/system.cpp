@@ -34,6 +34,7 @@ BodyConstants constants_of(const Body& body, bool is_planar, const Quat& q_WB) {
   if (is_planar) c.inertia = make_planar_inertia(body.inertia, transpose_times(to_matrix(q_WB), {0, 1, 0}));
   if (!body.fixed) {
     c.inverse_mass = 1 / body.mass;
+    c.gyration2 = 0.5 * c.inverse_mass * (body.inertia(0, 0) + body.inertia(1, 1) + body.inertia(2, 2));
     c.inverse_inertia = inverse(c.inertia);
   }
   return c;

@@ -25,7 +25,8 @@ namespace topple::mbs {
 /// One rigid body's constants; a ReplaceBody event makes them part of the state.
 struct BodyConstants {
   double mass = 0, inverse_mass = 0;
-  Mat3 inertia, inverse_inertia;    // in B
+  Mat3 inertia, inverse_inertia;    // in B; in a plane hard to turn out of it
+  double gyration2 = 0;             // square of the radius of gyration, of a mean axis of its own [m²]
   double radius = 0;                // of the sphere about the centre of mass that holds all shapes [m]
   int first_shape = 0, shapes = 0;  // into State::shapes
   double contact_stretch = 1;       // of the square of a contact's frequency by far points (contact.md)

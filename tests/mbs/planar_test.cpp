@@ -152,6 +152,67 @@ TEST(PlanarPhysics, ReplacedBodiesTurnAboutYAsTheirInertiaSays) {
   EXPECT_NEAR(views.back().w_WB[0].y, 0.5 * views.back().time / (0.2 * c * c + 0.3 * s * s), 1e-9);
 }
 
+TEST(PlanarPhysics, JointsThatRepeatEachOtherShareAsInSpace) {
+  // a body on two welds; (7a) of multibody.md weighs turns by a length that the hard turns out of the plane are none of
+  const auto moment_of = [](bool is_planar) {
+    Model m;
+    m.is_planar = is_planar;
+    m.contact.ground = m.contact.bodies = false;
+    Body body = make_box("b", 2, {1, 0.5, 0.2}, {});
+    body.inertia = Mat3::diagonal({0.1, 0.2, 0.3});
+    const BodyId b = add_body(m, body);
+    for (const double x : {-1.0, 1.0}) {
+      Joint j;
+      j.kind = Joint::Kind::Fixed;
+      j.parent = kGround, j.child = b;
+      j.X_PF.p = j.X_CM.p = {x, 0, 0};
+      add_joint(m, j);
+    }
+    Load l;
+    l.name = "torque", l.body = b;
+    l.torque = {0, 100, 0};
+    m.loads.push_back(l);
+    std::vector<View> views;
+    EXPECT_EQ(run(m, look(0.1, views)).ending, Summary::Ending::TimeLimit);
+    return views.back().joint_moment[0].y;
+  };
+  // ℓ² = 1 + (0.1 + 0.2 + 0.3) / (2 · 2)
+  const double length2 = 1.15, by_moments = 0.5 * length2 / (length2 + 1);
+  EXPECT_NEAR(moment_of(false), -100 * by_moments, 1e-9);
+  EXPECT_NEAR(moment_of(true), -100 * by_moments, 1e-9);
+}
+
+TEST(PlanarPhysics, BarsStretchedBetweenTwoHingesStand) {
+  for (const int bars : {2, 3, 6}) {
+    Model m;
+    m.is_planar = true;
+    m.contact.ground = m.contact.bodies = false;
+    Joint j;
+    j.kind = Joint::Kind::Revolute;
+    j.X_PF.q = j.X_CM.q = exp_rotation({-1.5707963267948966, 0, 0});  // about y
+    j.parent = kGround;
+    for (int i = 0; i < bars; ++i) {
+      Body bar = make_box("bar", 10, {1, 0.1, 0.1}, {i + 0.5, 0, 0});
+      bar.inertia = Mat3::diagonal({0.01, 0.84, 0.84});
+      j.child = add_body(m, bar);
+      j.X_CM.p = {-0.5, 0, 0};
+      add_joint(m, j);
+      j.parent = j.child;
+      j.X_PF.p = {0.5, 0, 0};
+    }
+    j.child = kGround;
+    j.X_CM.p = {static_cast<double>(bars), 0, 0};
+    add_joint(m, j);
+    std::vector<View> views;
+    Options o = look(1, views);
+    o.step = 1e-3;
+    const Summary s = run(m, o);
+    EXPECT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+    for (const View& v : views)
+      for (const Pose& X : v.X_WB) EXPECT_LT(std::abs(X.p.z), 2e-5) << bars;
+  }
+}
+
 TEST(PlanarPhysics, GravityAcrossThePlaneDoesNothing) {
   const auto fall = [](double across, double tilt) {
     Model m;
