@@ -56,6 +56,12 @@ BlockFrame find_block(const std::vector<BlockFrame>& frames, double time) {
   return at;
 }
 
+double calc_away(const Vec3& u, double height, const Knowledge& k) {
+  const double down = -u.z / k.stands_displacement,
+               aside = std::hypot(u.x, u.y) / std::max(k.stands_displacement, k.stands_drift * height);
+  return std::isfinite(down + aside) ? std::max(down, aside) : std::numeric_limits<double>::quiet_NaN();
+}
+
 /// Where a block leans, which a twist about its own axis or the vertical one is no part of.
 struct Lean {
   explicit Lean(const Quat& rotation) {
@@ -125,18 +131,17 @@ std::optional<double> find_last_swing(const MechanismInput& in) {
 
 }  // namespace
 
+BlockFrame::Motion find_motion(const BlockFrame& f, const Knowledge& k) {
+  return f.connected < k.mechanism_coherent_share ? f.pieces : BlockFrame::Motion{f.rotation, f.displacement, f.above};
+}
+
 double calc_away(const BlockFrame& block, const Knowledge& k) {
-  const Vec3& u = block.displacement;
-  const double down = -u.z / k.stands_displacement,
-               aside = std::hypot(u.x, u.y) / std::max(k.stands_displacement, k.stands_drift * block.height);
-  return std::isfinite(down + aside) ? std::max(down, aside) : std::numeric_limits<double>::quiet_NaN();
+  return calc_away(find_motion(block, k).displacement, block.height, k);
 }
 
 void find_deciding_touchdown(MechanismInput& in, const Knowledge& k) {
   const auto decides = [&](double time) {
-    const BlockFrame at = find_block(in.frames, time);
-    const Vec3& way = at.connected < k.mechanism_coherent_share ? at.pieces.displacement : at.displacement;
-    return !(-way.z < k.stands_displacement);
+    return !(-find_motion(find_block(in.frames, time), k).displacement.z < k.stands_displacement);
   };
   in.touchdown = std::numeric_limits<double>::quiet_NaN();
   for (const auto* times : {&in.touchdowns, &in.all_touchdowns}) {
@@ -162,8 +167,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
 
   // the way it leans when it touches down: the planned one, unless it turned more about another axis
   const bool is_in_pieces = at.connected < k.mechanism_coherent_share;
-  const BlockFrame::Motion whole =
-      is_in_pieces ? at.pieces : BlockFrame::Motion{at.rotation, at.displacement, at.above};
+  const BlockFrame::Motion whole = find_motion(at, k);
   const Lean lean(whole.rotation);
   Vec3 direction = in.fall_direction, lowest = direction;
   const bool leans = norm(lean.top) > 1e-3;
@@ -199,15 +203,21 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
       when, out.tilt / unit::deg, out.drop, 100 * out.rear_share, in.is_under_way ? "So far" : "In the end",
       100 * out.moved);
   const double height_left = in.frames.front().height > 0 ? last.height / in.frames.front().height : 1;
-  const double final_tilt = Lean(last.rotation).tilt;
-  // of the largest connected part of the upper block, not of pieces that came off
-  const double sunk = -last.displacement.z, aside = std::hypot(last.displacement.x, last.displacement.y);
-  const bool has_left = !(calc_away(last, k) < 1) && last.connected >= k.mechanism_coherent_share;
+  // of the largest connected part of the upper block, not of pieces that came off, if that is most of it
+  const BlockFrame::Motion end = find_motion(last, k);
+  const bool ends_in_pieces = last.connected < k.mechanism_coherent_share;
+  const double final_tilt = Lean(end.rotation).tilt;
+  const double sunk = -end.displacement.z, aside = std::hypot(end.displacement.x, end.displacement.y);
+  const bool has_left = !(calc_away(last, k) < 1);
   bool sways_less = false;
   const bool has_sunk = has_left && !(sunk < k.stands_displacement);
   if (out.moved < k.mechanism_stands_share && !has_left) {
     out.name = "stands";
     out.text = fmt::format("The building stands: {:.1f} % of its mass came down.", 100 * out.moved);
+    if (!(calc_away(last.pieces.displacement, last.height, k) < 1))
+      out.text +=
+          fmt::format(" Parts of it have left their places: the mass centre of all upper parts has moved by {:.2f} m.",
+                      norm(last.pieces.displacement));
     if (const auto swing = in.came_to_rest ? std::nullopt : find_last_swing(in)) {
       sways_less = true;
       if (*swing > 0)
@@ -232,6 +242,9 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
                          "Aborted collapse: the upper block has moved to a side by {:.2f} m and stands, leaning by "
                          "{:.1f} deg, its mass centre at {:.0f} % of its height.",
                          aside, final_tilt / unit::deg, 100 * height_left);
+    if (ends_in_pieces)
+      out.text += fmt::format(" It is in pieces, the largest of {:.0f} % of the upper mass: these numbers are of all.",
+                              100 * last.connected);
   } else if (out.moved < k.mechanism_partial_share) {
     out.name = "partial";
     out.text = fmt::format("Partial collapse: {}.", motion);

@@ -88,7 +88,10 @@ struct Mechanism {
 /// Rotation about the axis that leans by a positive angle towards the direction [rad].
 double calc_tilt(const Quat& rotation, const Vec3& fall_direction);
 
-/// How far the block is from its place: below 1 it stands. Of its way down over stands.displacement, and its way to a
+/// Of the block or, where that is less than mechanism.coherent_share of the upper mass, of all pieces.
+BlockFrame::Motion find_motion(const BlockFrame&, const Knowledge&);
+
+/// How far what find_motion() finds is from its place: below 1 it stands. Of its way down over stands.displacement, and its way to a
 /// side over that or, if more, over stands.drift of its height, the larger; NaN if it is nowhere.
 double calc_away(const BlockFrame&, const Knowledge&);
 

@@ -340,6 +340,34 @@ TEST(Mechanism, EdgesAreWhereItsLeanLeavesTheOutline) {
   EXPECT_NEAR(judge_mechanism(in, default_knowledge()).rear_share, rear / front, 1e-12);
 }
 
+TEST(Mechanism, PiecesThatHaveSunkDoNotStand) {
+  MechanismInput in = synthetic(0, 0, 0);
+  in.touchdown = kNaN;
+  BlockFrame& last = in.frames.back();
+  last.height = in.frames.front().height;
+  // the largest third is in its place, all together have sunk
+  last.displacement = {};
+  take_apart(last, 0.35);
+  last.pieces.displacement = {0, 0, -0.41};
+  EXPECT_NEAR(calc_away(last, default_knowledge()), 4.1, 1e-12);
+  EXPECT_THAT(judge_mechanism(in, default_knowledge()).text,
+              testing::StartsWith("It has begun to sink: the upper block has come down by 0.41 m."));
+  in.came_to_rest = true;
+  const Mechanism m = judge_mechanism(in, default_knowledge());
+  EXPECT_EQ(m.name, "partial");
+  EXPECT_THAT(m.text, testing::StartsWith("Aborted collapse: the upper block has sunk by 0.41 m and stands"));
+  EXPECT_THAT(m.text, testing::HasSubstr("It is in pieces, the largest of 35 % of the upper mass"));
+  // where most of it is in its place the building stands, but not all of it
+  last.connected = 0.68;
+  const Mechanism most = judge_mechanism(in, default_knowledge());
+  EXPECT_EQ(most.name, "stands");
+  EXPECT_THAT(most.text, testing::HasSubstr("the mass centre of all upper parts has moved by 0.41 m"));
+  last.pieces.displacement = {0, 0, -0.01};
+  EXPECT_THAT(judge_mechanism(in, default_knowledge()).text, testing::Not(testing::HasSubstr("left their places")));
+  last.connected = 0.35;
+  EXPECT_EQ(name_of(in), "stands");
+}
+
 TEST(Mechanism, ATwistIsNoPartOfTheLean) {
   constexpr double tilt = 0.1, twist = 0.5, towards = 0.3;
   const Vec3 lean = {std::cos(towards), std::sin(towards), 0};
