@@ -651,7 +651,13 @@ void Recorder::add_happening(const mbs::Happening& h) {
       const bool has_law = i < model_.elements.size() && !model_.elements[i].stations.empty();
       if (h.reason == "crushing") {
         how = "is crushed";
-        if (has_law && std::min(z.firing_time, z.weakening_time) > h.time) {
+        const auto switches = [&](const mbs::Event& e) {
+          return !(e.time > h.time) && std::any_of(e.actions.begin(), e.actions.end(), [i](const mbs::Action& a) {
+            return a.kind == mbs::Action::Kind::SwitchLaw && a.element.index == static_cast<int>(i);
+          });
+        };
+        if (has_law && std::min(z.firing_time, z.weakening_time) > h.time &&
+            std::none_of(model_.events.begin(), model_.events.end(), switches)) {
           const mbs::ZoneElement& e = model_.elements[i];
           const mbs::ZoneLaw& law = model_.laws[static_cast<size_t>(e.stations.front().law.index)];
           const double u = mbs::calc_crush_length(e.crush_through, law);

@@ -486,6 +486,10 @@ class Dataset {
       case Kind::RemoveElement:
         return off_element(a);
       case Kind::SwitchLaw:
+        if (a.law.index >= 0 && model_.laws[static_cast<size_t>(a.law.index)].keeps_length) {
+          losses_.add("a charge that leaves part of the concrete is left out: its zone stays as it was");
+          return {};
+        }
         if (a.stiffness_share >= 1) {
           losses_.add("a zone near a charge keeps its law: what the charge takes of it is left out");
           return {};

@@ -66,7 +66,11 @@ CompiledLaw compile_law(const ZoneLaw& law) {
     if (law.keeps_length) {
       const std::vector<double>& x = law.compression.x;
       end = std::upper_bound(x.begin(), x.end(), law.crush_length) - x.begin();
-      c.end_begins = end < static_cast<std::ptrdiff_t>(x.size()) ? x[static_cast<size_t>(end)] : law.crush_length;
+      // both ends bear at once where the curve rises to what lies behind within a share of that length; else along it
+      constexpr double meets = 1.002;
+      const bool bears_at_once =
+          end < static_cast<std::ptrdiff_t>(x.size()) && x[static_cast<size_t>(end)] <= meets * law.crush_length;
+      c.end_begins = bears_at_once ? x[static_cast<size_t>(end)] : law.crush_length;
     }
     const auto peak = std::max_element(law.compression.f.begin(), law.compression.f.begin() + end);
     c.peak_compression = *peak;

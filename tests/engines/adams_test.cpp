@@ -257,6 +257,18 @@ TEST(Adams, NamesWhatItCannotSay) {
                   HasSubstr("tied to the ground touches it"), HasSubstr("a charge takes its zone away at once")));
 }
 
+TEST(Adams, SaysThatAChargeWhichLeavesConcreteIsLeftOut) {
+  mbs::Model m = make_hinge();
+  mbs::ZoneLaw weak = m.laws[static_cast<size_t>(m.events[0].actions[0].law.index)];
+  weak.keeps_length = true;
+  weak.crush_length = 0.3;
+  weak.compression = {{0, 0.3}, {1e5, 1e5}};
+  m.events[0].actions[0].law = add_law(m, weak);
+  const AdamsFiles files = to_adams(m, {}, "x");
+  EXPECT_THAT(files.commands, testing::Not(HasSubstr("DEACTIVATE")));
+  EXPECT_THAT(files.notes, testing::Contains(HasSubstr("a charge that leaves part of the concrete is left out")));
+}
+
 TEST(Adams, NoTwoOperatorsFollowEachOther) {
   mbs::Model model = make_hinge();
   mbs::SpringDamper spring;

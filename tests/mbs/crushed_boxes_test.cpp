@@ -123,6 +123,29 @@ TEST(CrushedBoxPhysics, EndsMeetWhereAWeakLengthIsCrushedThrough) {
   }
 }
 
+TEST(CrushedBoxPhysics, WherePointsOfItsCurveAreDoesNotShortenAMember) {
+  // the same force all along, by one point behind the weak length or by two
+  const auto find_way = [](const std::vector<double>& x) {
+    Model m = make_post();
+    ZoneLaw weak = *m.laws.shared(0);
+    weak.compression = {x, std::vector<double>(x.size(), kBears)};
+    weak.keeps_length = true;
+    m.events.push_back(make_event(0, Action::Kind::SwitchLaw, 0));
+    m.events.back().actions.front().element = {0};
+    m.events.back().actions.front().law = add_law(m, weak);
+    Options o = options_of(1e-4);
+    double least = 1e9;
+    o.on_frame = [&](const View& v) { least = std::min(least, v.X_WB[0].p.z); };
+    EXPECT_LT(run(m, o).energy_error, 0.01);
+    return 2.25 - least;
+  };
+  const double way = kMass * 0.5 * kSpeed * kSpeed / (kBears - kMass * 9.81);
+  ASSERT_GT(way, 1.05 * kZone);
+  for (const double next : {1.001, 1.1, 1.5, 5.0})
+    EXPECT_NEAR(find_way({0, kZone, next * kZone, 20}), way, 0.01 * way) << next;
+  EXPECT_NEAR(find_way({0, 10}), way, 0.01 * way);
+}
+
 /// Lowest place of the plate when the post comes down on its end.
 double land(Model m, double step, double& energy_error) {
   m.events.push_back(make_event(0, Action::Kind::RemoveElement, 0));
