@@ -91,8 +91,8 @@ double calc_tilt(const Quat& rotation, const Vec3& fall_direction);
 /// Of the block or, where that is less than mechanism.coherent_share of the upper mass, of all pieces.
 BlockFrame::Motion find_motion(const BlockFrame&, const Knowledge&);
 
-/// How far what find_motion() finds is from its place: below 1 it stands. Of its way down over stands.displacement, and its way to a
-/// side over that or, if more, over stands.drift of its height, the larger; NaN if it is nowhere.
+/// How far what find_motion() finds is from its place: below 1 it stands. Of its way down over stands.displacement, and
+/// its way to a side over that or, if more, over stands.drift of its height, the larger; NaN if it is nowhere.
 double calc_away(const BlockFrame&, const Knowledge&);
 
 /// Sets `touchdown`: the first of the block, or else of any upper body, by which the block, or all of it where it is in
