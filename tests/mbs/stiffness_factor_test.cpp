@@ -30,7 +30,8 @@ Sparse make_matrix(int bodies, int each, double links, std::mt19937& random) {
     for (int m = 0; m < each; ++m) t.emplace_back(each * a + m, each * a + m, 20 * number(random));
   }
   for (int l = 0; l < links * bodies; ++l) add(body(random), body(random));
-  Sparse K(each * bodies, each * bodies);
+  const Eigen::Index n = Eigen::Index{each} * bodies;
+  Sparse K(n, n);
   K.setFromTriplets(t.begin(), t.end());
   return K;
 }
