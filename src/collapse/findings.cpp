@@ -275,7 +275,7 @@ Standing add_stability(const Context& c) {
     if (settled)
       text += fmt::format(", {}. The upper block has moved by {:.1f} cm and its fastest part moves at {:.3f} m/s",
                           count_words(z.broken, "none is broken", "is broken", "are broken"),
-                          100 * norm(find_motion(block[i], c.k).displacement), block[i].fastest);
+                          100 * norm(find_displacement(block[i], c.k)), block[i].fastest);
     text += ".";
     if (is_standing && margins.size() > 1) {
       text += " Lowest margins:";

@@ -135,8 +135,12 @@ BlockFrame::Motion find_motion(const BlockFrame& f, const Knowledge& k) {
   return f.connected < k.mechanism_coherent_share ? f.pieces : BlockFrame::Motion{f.rotation, f.displacement, f.above};
 }
 
+Vec3 find_displacement(const BlockFrame& f, const Knowledge& k) {
+  return f.connected < k.mechanism_coherent_share ? f.standing : f.displacement;
+}
+
 double calc_away(const BlockFrame& block, const Knowledge& k) {
-  return calc_away(find_motion(block, k).displacement, block.height, k);
+  return calc_away(find_displacement(block, k), block.height, k);
 }
 
 void find_deciding_touchdown(MechanismInput& in, const Knowledge& k) {
@@ -207,17 +211,16 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   const BlockFrame::Motion end = find_motion(last, k);
   const bool ends_in_pieces = last.connected < k.mechanism_coherent_share;
   const double final_tilt = Lean(end.rotation).tilt;
-  const double sunk = -end.displacement.z, aside = std::hypot(end.displacement.x, end.displacement.y);
+  const Vec3 moved_by = find_displacement(last, k);
+  const double sunk = -moved_by.z, aside = std::hypot(moved_by.x, moved_by.y);
   const bool has_left = !(calc_away(last, k) < 1);
   bool sways_less = false;
   const bool has_sunk = has_left && !(sunk < k.stands_displacement);
   if (out.moved < k.mechanism_stands_share && !has_left) {
     out.name = "stands";
     out.text = fmt::format("The building stands: {:.1f} % of its mass came down.", 100 * out.moved);
-    if (!(calc_away(last.pieces.displacement, last.height, k) < 1))
-      out.text +=
-          fmt::format(" Parts of it have left their places: the mass centre of all upper parts has moved by {:.2f} m.",
-                      norm(last.pieces.displacement));
+    if (1 - last.in_place >= k.mechanism_stands_share)
+      out.text += fmt::format(" {:.0f} % of its upper mass has left its place.", 100 * (1 - last.in_place));
     if (const auto swing = in.came_to_rest ? std::nullopt : find_last_swing(in)) {
       sways_less = true;
       if (*swing > 0)
@@ -231,7 +234,8 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.text =
         has_sunk ? fmt::format("It has begun to sink: the upper block has come down by {:.2f} m.", sunk)
                  : fmt::format("It leans: the mass centre of the upper block has moved to a side by {:.2f} m.", aside);
-  } else if (in.came_to_rest && has_left && final_tilt < k.mechanism_aborted_rotation && height_left > 0.5) {
+  } else if (in.came_to_rest && has_left && (!ends_in_pieces || out.moved < k.mechanism_partial_share) &&
+             final_tilt < k.mechanism_aborted_rotation && height_left > 0.5) {
     out.name = "partial";
     out.text = has_sunk
                    ? fmt::format(

@@ -26,6 +26,8 @@ struct BlockFrame {
   Vec3 displacement;     //
   double above = 0;      //
   Motion pieces;         // of all upper bodies
+  Vec3 standing;         // displacement of the pieces in their place if they are most of it, else of all pieces [m]
+  double in_place = 1;   // share of the upper mass that belongs to pieces in their place
   double connected = 1;  // mass of the block over the mass of all upper bodies that have not fallen off before
   double apart = 0;      // share of the upper mass that has (Recorder::apart_since_)
   double moved = 0;      // share of all moving mass of the structure that has gone farther than it may, to any side
@@ -91,8 +93,12 @@ double calc_tilt(const Quat& rotation, const Vec3& fall_direction);
 /// Of the block or, where that is less than mechanism.coherent_share of the upper mass, of all pieces.
 BlockFrame::Motion find_motion(const BlockFrame&, const Knowledge&);
 
-/// How far what find_motion() finds is from its place: below 1 it stands. Of its way down over stands.displacement, and
-/// its way to a side over that or, if more, over stands.drift of its height, the larger; NaN if it is nowhere.
+/// Of the mass centre of what is to stand: the block or, where it is in pieces, `standing`.
+Vec3 find_displacement(const BlockFrame&, const Knowledge&);
+
+/// How far what find_displacement() finds is from its place: below 1 it stands. Of its way down over
+/// stands.displacement, and its way to a side over that or, if more, over stands.drift of its height, the larger; NaN
+/// if it is nowhere.
 double calc_away(const BlockFrame&, const Knowledge&);
 
 /// Sets `touchdown`: the first of the block, or else of any upper body, by which the block, or all of it where it is in

@@ -285,6 +285,21 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) {
     f.pieces = f.connected == 1 ? block : find_motion(upper[s], [&](int b) {
       return map_.bodies[static_cast<size_t>(b)].structure == static_cast<int>(s);
     });
+    f.standing = f.pieces.displacement;
+    f.in_place = 0;
+    std::vector<Vec3> moment(B);  // of each piece: mass times displacement
+    for (size_t b = 0; b < B; ++b)
+      if (is_upper(static_cast<int>(b)) && !is_apart(b) && map_.bodies[b].structure == static_cast<int>(s))
+        moment[static_cast<size_t>(linked.find(static_cast<int>(b)))] += v.mass[b] * (centre_of(b) - start_of(b));
+    Vec3 sum;
+    for (size_t b = 0; b < B; ++b) {
+      if (!(group[b] > 0) || map_.bodies[b].structure != static_cast<int>(s)) continue;
+      BlockFrame piece;
+      piece.height = f.height, piece.displacement = (1 / group[b]) * moment[b];
+      if (calc_away(piece, k_) < 1) f.in_place += group[b], sum += moment[b];
+    }
+    if (f.in_place >= k_.mechanism_coherent_share * upper[s]) f.standing = (1 / f.in_place) * sum;
+    f.in_place /= upper[s];
     // what comes down and lands while the rest stands has fallen off: it is no part of how that falls
     const bool has_landed = std::any_of(touchdowns_.begin(), touchdowns_.end(), [&](const Touchdown& t) {
       return is_upper(t.body) && map_.bodies[static_cast<size_t>(t.body)].structure == static_cast<int>(s);

@@ -17,7 +17,7 @@ class StiffnessFactor {
   using Vector = Eigen::VectorXd;
 
   /// False: a pivot is zero.
-  ///   K  both triangles, n x n
+  ///   K  both triangles, n x n, compressed
   bool factorise(const Sparse& K);
   /// Of K x = b, after a factor without a pivot of zero.
   Vector solve(const Vector& b) const;

@@ -39,7 +39,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["It folds: {:.0f} % of the upper mass turns to one side of the fall, {:.0f} % to the other; {*}.", "Es faltet sich: {} % der oberen Masse drehen zu einer Seite der Fallrichtung, {} % zur anderen; {}."],
   ["It folds: {:.0f} % of the upper mass turns forward, {:.0f} % backward; {*}.", "Es faltet sich: {} % der oberen Masse drehen nach vorn, {} % nach hinten; {}."],
   ["Progressive collapse: the largest connected part holds {:.0f} % of the upper mass; {*}.", "Fortschreitender Einsturz: Der größte zusammenhängende Teil hat {} % der oberen Masse; {}."],
-  ["Parts of it have left their places: the mass centre of all upper parts has moved by {:.2f} m.", "Teile haben ihren Platz verlassen: Der Schwerpunkt aller oberen Teile hat sich um {} m bewegt."],
+  ["{:.0f} % of its upper mass has left its place.", "{} % seiner oberen Masse haben ihren Platz verlassen."],
   ["It is in pieces, the largest of {:.0f} % of the upper mass: these numbers are of all.", "Es ist in Stücken, das größte mit {} % der oberen Masse: Diese Zahlen sind die aller zusammen."],
   ["It is in pieces then, the largest of {:.0f} % of the upper mass: these numbers are of all.", "Es ist dann in Stücken, das größte mit {} % der oberen Masse: Diese Zahlen sind die aller zusammen."],
   ["It comes down vertically (telescoping): {*}.", "Es stürzt senkrecht in sich ein: {}."],
