@@ -368,6 +368,29 @@ TEST(PlanMapping, FallsEarlyOnlyWhereThePlanAsksItToStand) {
   EXPECT_NE(classify(""), "early");
 }
 
+TEST(PlanMapping, FallsEarlyInAnyPauseWhicheverStructureTheLastStageActsOn) {
+  // a tall shaft comes down before its second stage; the last one is of a small shaft beside it
+  const std::string ring =
+      "thickness = \"25 cm\"\nconcrete = \"C20\"\nsteel = \"S\"\nas_outer = \"8 cm2/m\"\nas_inner = \"8 cm2/m\"\n"
+      "joint_spacing = \"10 m\"\n";
+  const auto stage = [](const std::string& of, const std::string& time, const std::string& position) {
+    return "[[stage]]\nname = \"" + of + time + "\"\ntime = \"" + time + "\"\n[[stage.charge]]\nmembers = \"" + of +
+           "\"\nposition = \"" + position +
+           "\"\ndestroyed_length = \"1.5 m\"\nazimuth = \"180 deg\"\nopening = \"200 deg\"\nresidual_bars = 0.05\n";
+  };
+  const std::string text =
+      "title = \"Two\"\n[concrete.C20]\nfc = \"20 N/mm2\"\nEc = \"27 GPa\"\n[steel.S]\nfy = \"420 N/mm2\"\n"
+      "fu = \"500 N/mm2\"\neps_u = \"8 %\"\n[[shafts]]\nname = \"big\"\nheight = \"30 m\"\ndiameter = \"4 m\"\n" +
+      ring + "[[shafts]]\nname = \"small\"\nposition = [\"0 m\", \"-15 m\"]\nheight = \"10 m\"\ndiameter = \"3 m\"\n" +
+      ring + stage("big", "0.1 s", "2 m") + stage("big", "6 s", "5 m") + stage("small", "6.1 s", "2 m") +
+      "[criteria]\nmechanism = \"topple\"\nstands_between_stages = true\n[analysis]\nduration = \"6.5 s\"\n"
+      "frame_rate = \"20 Hz\"\n[fuzzy]\nconcrete.C20.fc = { triangular = [\"19 N/mm2\", \"20 N/mm2\", \"21 N/mm2\"] "
+      "}\n";
+  std::vector<Diagnostic> warnings;
+  const PlanMapping m(product::read_plan(text, "plan.toml", warnings), collapse::default_knowledge(), {});
+  EXPECT_EQ(plan_outcomes()[static_cast<size_t>(evaluate(m, {{20e6}})[0].outcome)], "early");
+}
+
 /// A house whose front row fires and, soon after, its rear row.
 product::Plan read_house() {
   return collapse::read(collapse::house(collapse::charge("C-A*-0") + collapse::charge("C-B*-0", "0.2 s") +
