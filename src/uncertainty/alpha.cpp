@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "uncertainty/facets.h"
+#include "uncertainty/goal.h"
+#include "uncertainty/groups.h"
 #include "uncertainty/kink_search.h"
 #include "uncertainty/levels.h"
 #include "uncertainty/line_search.h"
@@ -17,36 +19,6 @@
 
 namespace topple::uncertainty {
 namespace {
-
-constexpr double infinite = std::numeric_limits<double>::infinity();
-constexpr int any_class = -2;
-constexpr int most_in_vain = 5;           // searches of one goal that neither end nor gain
-constexpr double least_edge_gain = 1e-6;  // along a kink, as a part of an output's width
-constexpr double least_line_gain = 1e-5;  // along an axis
-constexpr int most_line_places = 6;       // of an axis, that other ends of searches propose
-constexpr double near_optimum = 0.02;     // of a cut's widths, within which a search would end there
-
-/// What is looked for: the least value of sign * output in the cut of a level, among one class or all.
-struct Goal {
-  int output = 0;
-  int level = 0;
-  double sign = 1;
-  int outcome = any_class;
-};
-
-/// Output, and whether its least or its largest value is looked for.
-std::pair<int, bool> side_of(const Goal& goal) { return {goal.output, goal.sign > 0}; }
-
-struct Candidate {
-  double value = infinite;
-  int sample = -1;
-};
-
-/// A local optimum, and the level in whose cut it was found.
-struct Optimum {
-  int sample = -1;
-  int level = 0;
-};
 
 /// The state of one optimisation.
 class Optimisation {
@@ -59,6 +31,7 @@ class Optimisation {
 
   AlphaResult run() {
     explore();
+    search_groups();
     check_faces(false);
     if (has_line_searches() && has_room_for_lines()) search_lines(false);
     search_from_best(false);
@@ -114,6 +87,7 @@ class Optimisation {
       if (!has_many_inputs()) scan(), share_optima();
       for (int k = 0; k < 2; ++k) restart_faces(true);
       const bool has_starts = search_dispersed();
+      join_groups();
       recheck(false);
       idle = note_round(before) ? 0 : idle + 1;
       if (idle >= options_.patience && !unfinished_) is_done_ = true;
@@ -306,6 +280,67 @@ class Optimisation {
       if (!space_.has_interaction() || r.contains(x)) joined.push_back(std::move(x));
     }
     ask(joined);
+  }
+
+  // ---- groups of inputs whose functions add up
+
+  /// Of outputs that are such sums, for each bound: searches in each group from its best places, and then of all groups
+  /// together what came out best. Fewer inputs have few basins.
+  void search_groups() {
+    constexpr std::size_t least_inputs = 6, starts = 4;
+    constexpr int least_runs = 500;  // left, for each input
+    const std::size_t n = regions_.front().axes.size();
+    if (n < least_inputs || has_many_inputs() || space_.has_interaction() || options_.budget > 0 ||
+        asker_.rest() < least_runs * static_cast<int>(n))
+      return;
+    for (int output = 0; output < asker_.outputs(); ++output) {
+      if (std::count(options_.passive_outputs.begin(), options_.passive_outputs.end(), output) > 0) continue;
+      GroupSearch search(space_, asker_, regions_, output, 1e-7 * width_of(output), options_.seed);
+      if (!search.find()) {
+        // what was run for that alone shall lead no search astray
+        depth_.resize(static_cast<std::size_t>(asker_.asked()), 0);
+        continue;
+      }
+      groups_.emplace(output, search.groups());
+      ask(search.compose());
+      const std::vector<GroupSearch::Start> from = search.list_starts(starts);
+      std::vector<Point> points;
+      for (const auto& start : from) points.push_back(start.x);
+      ask(points);
+      std::vector<Running> all;
+      for (const auto& start : from) {
+        const Goal goal{output, start.level, start.sign};
+        const int at = asker_.archive().find(start.x);
+        if (at < 0) continue;
+        all.push_back({goal, make_model_search(goal, {value_of(goal, at), at}, 0.1, 1, &search.groups()[start.group])});
+        all.back().of_group = true;
+      }
+      const int limit = asker_.limit();
+      const bool was_unfinished = unfinished_;
+      asker_.set_limit(limit - asker_.rest() / 2);
+      advance(all);
+      asker_.set_limit(limit);
+      unfinished_ = was_unfinished;
+      ask(search.compose());
+    }
+  }
+
+  /// The best samples with one group's inputs where another search ended.
+  void join_groups() {
+    std::vector<Point> points;
+    for (const Goal& goal : make_goals(false)) {
+      const auto groups = groups_.find(goal.output);
+      const Candidate best = find_best(goal);
+      if (groups == groups_.end() || best.sample < 0) continue;
+      for (const Optimum& o : optima_[side_of(goal)]) {
+        const Point y = clip(regions_[goal.level].box, asker_.archive()[o.sample].x);
+        for (const std::vector<int>& group : groups->second) {
+          points.push_back(asker_.archive()[best.sample].x);
+          for (const int i : group) points.back()[i] = y[i];
+        }
+      }
+    }
+    if (!points.empty()) ask(points);
   }
 
   // ---- lines through best samples
@@ -562,6 +597,7 @@ class Optimisation {
     bool of_restart = false;  // refines where a search over the faces ended
     bool may_stop = false;    // where that is vain
     bool has_stopped = false;
+    bool of_group = false;  // varies the inputs of one alone
     double start = search ? search->value() : infinite;
   };
 
@@ -585,16 +621,19 @@ class Optimisation {
     return is_shallow;
   }
 
-  std::unique_ptr<LocalSearch> make_model_search(const Goal& goal, const Candidate& start, double radius, int probes) {
+  ///   axes  inputs that it varies; null: all of the cut
+  std::unique_ptr<LocalSearch> make_model_search(const Goal& goal, const Candidate& start, double radius, int probes,
+                                                 const std::vector<int>* axes = nullptr) {
     ModelSearch::Options o;
     o.radius = radius;
     o.probes = probes;
-    o.tolerance = options_.tolerance * width_of(goal.output);
+    o.tolerance = (axes ? group_tolerance : options_.tolerance) * width_of(goal.output);
     if (seeks_edges()) o.edge = 1e-3;
     o.doubts_edges = !has_kinks(goal);
     if (!is_steep(goal)) o.looks_steep = [this, goal](const Point& x) { return !gentle_.contains(key_of(goal, x)); };
     o.seed = options_.seed + ++searches_;
-    const Region& region = regions_[goal.level];
+    Region region = regions_[goal.level];
+    if (axes) region.axes = *axes;
     const Point& from = asker_.archive()[start.sample].x;
     auto search = std::make_unique<ModelSearch>(region, from, tell_of(goal, start.sample), o);
     // runs nearby, the nearest last
@@ -671,6 +710,7 @@ class Optimisation {
         continue;
       }
       if (!r.search->is_done()) unfinished_ = true;
+      if (r.of_group) continue;
       const bool is_kink = dynamic_cast<const KinkSearch*>(r.search.get()) != nullptr;
       if (is_kink && r.search->is_done() && !r.search->is_converged()) {
         // goes on from there, unless it moves no more
@@ -817,19 +857,6 @@ class Optimisation {
   bool has_many_inputs() const { return is_open(0); }
   /// Whether the corners of a level's cut are left to searches.
   bool is_open(int level) const { return static_cast<int>(regions_[level].axes.size()) > options_.corner_inputs; }
-
-  /// What searches over the faces did for a goal.
-  struct Faces {
-    double end = infinite;       // best value at which one ended
-    double paired = infinite;    // at which one ended behind all pairs of moves
-    double foretold = infinite;  // and whose model foretold what was tried
-    double best = infinite;      // to which the counts belong
-    int idle = 0;                // restarts without gain
-    int again = 0;               // of them, those that ended at the best from a place of their own
-    int elsewhere = 0;           // those that did not
-    double last = infinite;      // where the last restart ended
-    Point last_at;
-  };
 
   void note_faces(const Goal& goal, const FaceSearch& search) {
     Faces& f = faces_[key_of(goal)];
@@ -1142,6 +1169,7 @@ class Optimisation {
   std::set<Key> gentle_;                                         // of bounds that were looked at for that and are not
   std::map<Key, int> idle_rounds_;                               // in a row, that gained nothing
   bool has_shallow_valleys_ = false;                             // that searches were stopped in
+  std::map<int, std::vector<std::vector<int>>> groups_;          // by output, of inputs whose functions add up
   std::map<Key, Faces> faces_;
   std::map<Key, std::vector<int>> scanned_;  // samples through which lines led to no better basin
   int next_spread_ = 1;
@@ -1153,17 +1181,6 @@ class Optimisation {
 };
 
 }  // namespace
-
-AlphaOptions make_thrifty_options() {
-  AlphaOptions o;
-  o.starts = 1;
-  o.evolutions = 0;
-  o.patience = 1;
-  o.restarts = 2;
-  o.lines = 0;
-  o.search_classes = false;
-  return o;
-}
 
 struct AlphaSearch::Parts {
   Optimisation optimisation;
@@ -1177,22 +1194,5 @@ AlphaSearch::~AlphaSearch() = default;
 AlphaResult AlphaSearch::run() { return parts_->optimisation.run(); }
 AlphaResult AlphaSearch::go_on() { return parts_->optimisation.go_on(); }
 AlphaResult AlphaSearch::spread_on(int count) { return parts_->optimisation.spread_on(count); }
-
-AlphaResult optimise(const Space& space, Asker& asker, const AlphaOptions& options) {
-  return AlphaSearch(space, asker, options).run();
-}
-
-AlphaResult optimise(const Space& space, const Evaluate& evaluate, const AlphaOptions& options,
-                     const Progress& progress) {
-  Asker asker(evaluate, progress, options.earlier, options.limit);
-  AlphaResult result = optimise(space, asker, options);
-  result.archive = asker.archive();
-  return result;
-}
-
-AlphaResult optimise(const std::vector<FuzzyNumber>& inputs, const Evaluate& evaluate, const AlphaOptions& options,
-                     const Progress& progress) {
-  return optimise(Space{inputs, {}, {}}, evaluate, options, progress);
-}
 
 }  // namespace topple::uncertainty

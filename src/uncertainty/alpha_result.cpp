@@ -90,4 +90,32 @@ FuzzyNumber make_number(const AlphaResult& result, int output) {
   return make_number(result.outputs[output]);
 }
 
+AlphaOptions make_thrifty_options() {
+  AlphaOptions o;
+  o.starts = 1;
+  o.evolutions = 0;
+  o.patience = 1;
+  o.restarts = 2;
+  o.lines = 0;
+  o.search_classes = false;
+  return o;
+}
+
+AlphaResult optimise(const Space& space, Asker& asker, const AlphaOptions& options) {
+  return AlphaSearch(space, asker, options).run();
+}
+
+AlphaResult optimise(const Space& space, const Evaluate& evaluate, const AlphaOptions& options,
+                     const Progress& progress) {
+  Asker asker(evaluate, progress, options.earlier, options.limit);
+  AlphaResult result = optimise(space, asker, options);
+  result.archive = asker.archive();
+  return result;
+}
+
+AlphaResult optimise(const std::vector<FuzzyNumber>& inputs, const Evaluate& evaluate, const AlphaOptions& options,
+                     const Progress& progress) {
+  return optimise(Space{inputs, {}, {}}, evaluate, options, progress);
+}
+
 }  // namespace topple::uncertainty

@@ -604,6 +604,43 @@ Ends calc_chain_ends(int n, double low, double high) {
   return {-calc_largest(-1), calc_largest(1)};
 }
 
+// Of three groups each has several basins: a search over all inputs at once ends in one of as many as their product.
+TEST(AlphaGroups, SumsOfFunctionsOfAFewInputsAreExact) {
+  std::vector<FuzzyNumber> inputs;
+  for (int i = 0; i < 8; ++i) inputs.push_back(make_triangular(-1, -0.2 + 0.04 * i, 1));
+  const Evaluate model = make_evaluate_values([](const Point& x) {
+    return std::vector{std::cos(4 * x[0] - x[1] * x[1]) * x[2] + std::cos(3 * x[3] + x[4]) * x[5] + x[6] * x[7]};
+  });
+  for (const std::uint64_t seed : {1, 2}) {
+    AlphaOptions options;
+    options.seed = seed;
+    const AlphaResult r = optimise(inputs, model, options, {});
+    const auto& at = r.outputs[0].levels;
+    EXPECT_NEAR(at[0].lower.value, -3, 1e-6);
+    EXPECT_NEAR(at[0].upper.value, 3, 1e-6);
+    EXPECT_NEAR(at[1].lower.value, -0.78 - 0.75 - 0.74 * 0.77, 1e-6);
+    EXPECT_NEAR(at[1].upper.value, 0.78 + 0.75 + 0.76 * 0.77, 1e-6);
+    EXPECT_NEAR(at[2].lower.value, -0.56 - 0.5 - 0.48 * 0.54, 1e-6);
+    for (int k = 0; k < 3; ++k) EXPECT_TRUE(at[k].lower.converged) << k;
+  }
+}
+
+TEST(AlphaGroups, AreFoundWhereCornersTellOfNone) {
+  // cos(3 x) y is the same at both ends of x
+  std::vector<FuzzyNumber> inputs;
+  for (int i = 0; i < 8; ++i) inputs.push_back(make_triangular(-1, -0.3 + 0.07 * i, 1));
+  AlphaOptions options;
+  options.levels = {0, 1};
+  const AlphaResult r = optimise(inputs, make_evaluate_values([](const Point& x) {
+                                   double sum = 0;
+                                   for (std::size_t i = 0; i < 8; i += 2) sum += std::cos(3 * x[i]) * x[i + 1];
+                                   return std::vector{sum};
+                                 }),
+                                 options, {});
+  EXPECT_NEAR(r.outputs[0].levels[0].lower.value, -4, 1e-6);
+  EXPECT_NEAR(r.outputs[0].levels[0].upper.value, 4, 1e-6);
+}
+
 TEST(AlphaManyInputs, AlternatingChainIsExact) {
   const FuzzyNumber f = make_triangular(-1, .3, 2);
   const auto model = make_evaluate_values([](const Point& x) { return std::vector{calc_chain(x)}; });
