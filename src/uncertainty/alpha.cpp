@@ -311,16 +311,18 @@ class Optimisation {
       for (const auto& start : from) {
         const Goal goal{output, start.level, start.sign};
         const int at = asker_.archive().find(start.x);
-        if (at < 0) continue;
-        all.push_back({goal, make_model_search(goal, {value_of(goal, at), at}, 0.1, 1, &search.groups()[start.group])});
+        const std::vector<int>& wide = regions_[start.level].axes;
+        std::vector<int> axes = search.groups()[start.group];
+        std::erase_if(axes, [&](int i) { return std::count(wide.begin(), wide.end(), i) == 0; });
+        if (at < 0 || axes.empty()) continue;
+        all.push_back({goal, make_model_search(goal, {value_of(goal, at), at}, 0.1, 1, &axes)});
         all.back().of_group = true;
       }
       const int limit = asker_.limit();
-      const bool was_unfinished = unfinished_;
+      const bool was_unfinished = std::exchange(unfinished_, false);
       asker_.set_limit(limit - asker_.rest() / 2);
       advance(all);
-      asker_.set_limit(limit);
-      unfinished_ = was_unfinished;
+      asker_.set_limit(limit), unfinished_ = was_unfinished;
       ask(search.compose());
     }
   }
