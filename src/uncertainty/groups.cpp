@@ -19,8 +19,7 @@ constexpr std::size_t most_inputs = 4;       // of a group whose basins so few p
 
 GroupSearch::GroupSearch(const Space& space, Asker& asker, const std::vector<Region>& levels, int output,
                          double tolerance, std::uint64_t seed)
-    : space_(space),
-      asker_(asker),
+    : asker_(asker),
       levels_(levels),
       output_(output),
       tolerance_(tolerance),

@@ -55,7 +55,6 @@ class GroupSearch {
   template <class Function>
   void each_side(Function) const;
 
-  const Space& space_;
   Asker& asker_;
   const std::vector<Region>& levels_;
   int output_;
