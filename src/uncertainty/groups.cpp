@@ -19,12 +19,7 @@ constexpr std::size_t most_inputs = 4;       // of a group whose basins so few p
 
 GroupSearch::GroupSearch(const Space& space, Asker& asker, const std::vector<Region>& levels, int output,
                          double tolerance, std::uint64_t seed)
-    : asker_(asker),
-      levels_(levels),
-      output_(output),
-      tolerance_(tolerance),
-      seed_(seed),
-      centre_(calc_centre(space)) {
+    : asker_(asker), levels_(levels), output_(output), tolerance_(tolerance), seed_(seed), centre_(calc_centre(space)) {
   for (std::size_t k = 0; k < levels.front().axes.size(); ++k) parent_.push_back(static_cast<int>(k));
 }
 
