@@ -287,23 +287,25 @@ class Optimisation {
   /// Of outputs that are such sums, for each bound: searches in each group from its best places, and then of all groups
   /// together what came out best. Fewer inputs have few basins.
   void search_groups() {
-    constexpr std::size_t least_inputs = 6, starts = 4;
-    constexpr int least_runs = 500;  // left, for each input
-    const std::size_t n = regions_.front().axes.size();
-    if (n < least_inputs || has_many_inputs() || space_.has_interaction() || options_.budget > 0 ||
-        asker_.rest() < least_runs * static_cast<int>(n))
-      return;
-    for (int output = 0; output < asker_.outputs(); ++output) {
+    constexpr int least_inputs = 6, starts = 4, least_runs = 150;  // runs: of an output, for each input
+    const int n = static_cast<int>(regions_.front().axes.size()), limit = asker_.limit(), reserve = asker_.rest() / 2;
+    if (n < least_inputs || has_many_inputs() || space_.has_interaction() || options_.budget > 0) return;
+    const bool was_unfinished = std::exchange(unfinished_, false);
+    for (int output = 0, others = asker_.outputs() - static_cast<int>(options_.passive_outputs.size());
+         output < asker_.outputs(); ++output) {
       if (std::count(options_.passive_outputs.begin(), options_.passive_outputs.end(), output) > 0) continue;
+      // half of the runs that are left, shared by all outputs
+      const int own = (limit - reserve - asker_.asked()) / std::max(1, others--);
+      if (own < least_runs * n) break;
+      asker_.set_limit(asker_.asked() + own);
       GroupSearch search(space_, asker_, regions_, output, 1e-7 * width_of(output), options_.seed);
       if (!search.find()) {
-        // what was run for that alone shall lead no search astray
-        depth_.resize(static_cast<std::size_t>(asker_.asked()), 0);
+        depth_.resize(static_cast<std::size_t>(asker_.asked()), 0);  // what was run for that is no start of searches
         continue;
       }
       groups_.emplace(output, search.groups());
       ask(search.compose());
-      const std::vector<GroupSearch::Start> from = search.list_starts(starts);
+      const auto from = search.list_starts(starts);
       std::vector<Point> points;
       for (const auto& start : from) points.push_back(start.x);
       ask(points);
@@ -315,16 +317,14 @@ class Optimisation {
         std::vector<int> axes = search.groups()[start.group];
         std::erase_if(axes, [&](int i) { return std::count(wide.begin(), wide.end(), i) == 0; });
         if (at < 0 || axes.empty()) continue;
-        all.push_back({goal, make_model_search(goal, {value_of(goal, at), at}, 0.1, 1, &axes)});
-        all.back().of_group = true;
+        all.push_back({goal, make_model_search(goal, {value_of(goal, at), at}, 0.1, 1, &axes)}),
+            all.back().of_group = true;
       }
-      const int limit = asker_.limit();
-      const bool was_unfinished = std::exchange(unfinished_, false);
-      asker_.set_limit(limit - asker_.rest() / 2);
       advance(all);
-      asker_.set_limit(limit), unfinished_ = was_unfinished;
+      asker_.set_limit(limit);
       ask(search.compose());
     }
+    asker_.set_limit(limit), unfinished_ = was_unfinished;
   }
 
   /// The best samples with one group's inputs where another search ended.
