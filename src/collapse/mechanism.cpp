@@ -140,7 +140,10 @@ Vec3 find_displacement(const BlockFrame& f, const Knowledge& k) {
 }
 
 double calc_away(const BlockFrame& block, const Knowledge& k) {
-  return calc_away(find_displacement(block, k), block.height, k);
+  const double away = calc_away(find_displacement(block, k), block.height, k);
+  // ways of pieces that go apart may add up to nothing
+  const double share = k.mechanism_coherent_share;
+  return block.connected < share && block.in_place < share ? std::max(away, 1.0) : away;
 }
 
 void find_deciding_touchdown(MechanismInput& in, const Knowledge& k) {

@@ -365,9 +365,21 @@ TEST(Mechanism, PiecesThatHaveSunkDoNotStand) {
   EXPECT_THAT(most.text, testing::HasSubstr("32 % of its upper mass has left its place."));
   last.pieces.displacement = last.standing = {0, 0, -0.01};
   last.in_place = 0.995;
+  EXPECT_LT(calc_away(last, default_knowledge()), 1);
   EXPECT_THAT(judge_mechanism(in, default_knowledge()).text, testing::Not(testing::HasSubstr("left its place")));
   last.connected = 0.35;
   EXPECT_EQ(name_of(in), "stands");
+}
+
+TEST(Mechanism, PiecesThatGoApartDoNotStand) {
+  MechanismInput in = synthetic(0, 0, 0);
+  in.touchdown = kNaN;
+  BlockFrame& last = in.frames.back();
+  take_apart(last, 0.45);
+  last.pieces.displacement = last.standing = {};  // one to either side
+  last.in_place = 0.1;
+  EXPECT_GE(calc_away(last, default_knowledge()), 1);
+  EXPECT_NE(name_of(in), "stands");
 }
 
 TEST(Mechanism, ATwistIsNoPartOfTheLean) {
