@@ -62,6 +62,13 @@ double calc_away(const Vec3& u, double height, const Knowledge& k) {
   return std::isfinite(down + aside) ? std::max(down, aside) : std::numeric_limits<double>::quiet_NaN();
 }
 
+bool is_in_pieces(const BlockFrame& f, const Knowledge& k) { return f.connected < k.mechanism_coherent_share; }
+
+/// Of the block or, in pieces, of all of them.
+BlockFrame::Motion find_motion(const BlockFrame& f, const Knowledge& k) {
+  return is_in_pieces(f, k) ? f.pieces : BlockFrame::Motion{f.rotation, f.displacement, f.above};
+}
+
 /// Where a block leans, which a twist about its own axis or the vertical one is no part of.
 struct Lean {
   explicit Lean(const Quat& rotation) {
@@ -131,19 +138,14 @@ std::optional<double> find_last_swing(const MechanismInput& in) {
 
 }  // namespace
 
-BlockFrame::Motion find_motion(const BlockFrame& f, const Knowledge& k) {
-  return f.connected < k.mechanism_coherent_share ? f.pieces : BlockFrame::Motion{f.rotation, f.displacement, f.above};
-}
-
 Vec3 find_displacement(const BlockFrame& f, const Knowledge& k) {
-  return f.connected < k.mechanism_coherent_share ? f.standing : f.displacement;
+  return is_in_pieces(f, k) ? f.standing : f.displacement;
 }
 
 double calc_away(const BlockFrame& block, const Knowledge& k) {
   const double away = calc_away(find_displacement(block, k), block.height, k);
   // ways of pieces that go apart may add up to nothing
-  const double share = k.mechanism_coherent_share;
-  return block.connected < share && block.in_place < share ? std::max(away, 1.0) : away;
+  return is_in_pieces(block, k) && block.in_place < k.mechanism_coherent_share ? std::max(away, 1.0) : away;
 }
 
 void find_deciding_touchdown(MechanismInput& in, const Knowledge& k) {
@@ -173,7 +175,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   out.run.z = 0;
 
   // the way it leans when it touches down: the planned one, unless it turned more about another axis
-  const bool is_in_pieces = at.connected < k.mechanism_coherent_share;
+  const bool lands_in_pieces = is_in_pieces(at, k);
   const BlockFrame::Motion whole = find_motion(at, k);
   const Lean lean(whole.rotation);
   Vec3 direction = in.fall_direction, lowest = direction;
@@ -212,7 +214,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   const double height_left = in.frames.front().height > 0 ? last.height / in.frames.front().height : 1;
   // of the largest connected part of the upper block, not of pieces that came off, if that is most of it
   const BlockFrame::Motion end = find_motion(last, k);
-  const bool ends_in_pieces = last.connected < k.mechanism_coherent_share;
+  const bool ends_in_pieces = is_in_pieces(last, k);
   const double final_tilt = Lean(end.rotation).tilt;
   const Vec3 moved_by = find_displacement(last, k);
   const double sunk = -moved_by.z, aside = std::hypot(moved_by.x, moved_by.y);
@@ -283,7 +285,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.name = "topple";
     out.text = fmt::format("It topples: {}.", motion);
   }
-  if (is_in_pieces && out.name != "stands" && out.name != "partial" && out.name != "progressive")
+  if (lands_in_pieces && out.name != "stands" && out.name != "partial" && out.name != "progressive")
     out.text +=
         fmt::format(" It is in pieces then, the largest of {:.0f} % of the upper mass: these numbers are of all.",
                     100 * at.connected);

@@ -90,10 +90,8 @@ struct Mechanism {
 /// Rotation about the axis that leans by a positive angle towards the direction [rad].
 double calc_tilt(const Quat& rotation, const Vec3& fall_direction);
 
-/// Of the block or, where that is less than mechanism.coherent_share of the upper mass, of all pieces.
-BlockFrame::Motion find_motion(const BlockFrame&, const Knowledge&);
-
-/// Of the mass centre of what is to stand: the block or, where it is in pieces, `standing`.
+/// Of the mass centre of what is to stand: the block or, where that is less than mechanism.coherent_share of the upper
+/// mass, `standing`.
 Vec3 find_displacement(const BlockFrame&, const Knowledge&);
 
 /// How far what find_displacement() finds is from its place: below 1 it stands. Of its way down over

@@ -178,12 +178,12 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
       find_structures_to_stand(s.plan, s.map, stages.empty() ? out.time.back() : stages.back().first);
   const std::vector<BlockFrame> block = s.recorder->farthest_block_frames(counts);
   const size_t before = find_frame(block, stages.empty() ? out.time.back() : stages.back().first);
-  // in each pause by what has charges to come
-  out.stood = true;
-  for (size_t i = 1; i < stages.size(); ++i) {
+  // in each pause by what has charges to come; the last one is known
+  out.stood = stages.size() < 2 || stands(block[before], k);
+  for (size_t i = 1; i + 1 < stages.size() && out.stood; ++i) {
     const double end = stages[i].first;
     const auto then = s.recorder->farthest_block_frames(find_structures_to_stand(s.plan, s.map, end));
-    out.stood = out.stood && stands(then[find_frame(then, end)], k);
+    out.stood = stands(then[find_frame(then, end)], k);
   }
   const auto find_use = [&] {
     if (counts.size() < 2) return s.recorder->zone_frames()[before].utilisation;

@@ -1,6 +1,6 @@
 /// Dead-load equilibrium by Newton's method with the elastic stiffness, joints by the augmented Lagrangian; and the
-/// stiffest mode by Lanczos' method (docs/theory/multibody.md, eq. 8 to 10). With stiffness_factor.h the
-/// one place of the module that sees sparse matrices.
+/// stiffest mode by Lanczos' method (docs/theory/multibody.md, eq. 8 to 10). With stiffness_factor.h
+/// the one place of the module that sees sparse matrices.
 
 #include <fmt/format.h>
 

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <limits>
+#include <string_view>
 
 #include "mbs/contact_kernel.h"
 #include "mbs/ground_kernel.h"
@@ -196,22 +198,6 @@ void Lanes::share_again() {
   if (uses.size() > 2 * shared + 512) share_constants();
 }
 
-namespace {
-
-/// Of the bytes of doubles.
-std::uint64_t calc_hash(const double* x, size_t count) {
-  std::uint64_t hash = 0;
-  for (size_t l = 0; l < count; ++l) {
-    std::uint64_t bits;
-    std::memcpy(&bits, x + l, sizeof bits);
-    hash = (hash ^ bits) * 0x9e3779b97f4a7c15ULL;
-    hash ^= hash >> 32;
-  }
-  return hash;
-}
-
-}  // namespace
-
 void Lanes::share_constants() {
   AlignedVector<double> merged;
   std::vector<std::uint32_t> counts, moved(uses.size(), kNoSlot);
@@ -221,7 +207,7 @@ void Lanes::share_constants() {
   std::vector<std::uint32_t> known(places, kNoSlot);
   const size_t size = W * sizeof(double);
   const auto find = [&](const double* x) {
-    size_t place = calc_hash(x, W) & (places - 1);
+    size_t place = std::hash<std::string_view>()({reinterpret_cast<const char*>(x), size}) & (places - 1);
     while (known[place] != kNoSlot && std::memcmp(merged.data() + size_t{known[place]} * W, x, size) != 0)
       place = (place + 1) & (places - 1);
     if (known[place] == kNoSlot) {

@@ -19,9 +19,13 @@ constexpr std::size_t most_inputs = 4;       // of a group whose basins so few p
 
 GroupSearch::GroupSearch(const Space& space, Asker& asker, const std::vector<Region>& levels, int output,
                          double tolerance, std::uint64_t seed)
-    : asker_(asker), levels_(levels), output_(output), tolerance_(tolerance), seed_(seed), centre_(calc_centre(space)) {
-  for (std::size_t k = 0; k < levels.front().axes.size(); ++k) parent_.push_back(static_cast<int>(k));
-}
+    : asker_(asker),
+      levels_(levels),
+      output_(output),
+      tolerance_(tolerance),
+      seed_(seed),
+      centre_(calc_centre(space)),
+      together_(levels.front().axes.size()) {}
 
 double GroupSearch::value_at(const Point& x) const {
   const int i = asker_.archive().find(x);
@@ -29,31 +33,20 @@ double GroupSearch::value_at(const Point& x) const {
   return asker_.archive()[i].result.values[output_];
 }
 
-int GroupSearch::root_of(int axis) const {
-  while (parent_[axis] != axis) axis = parent_[axis];
-  return axis;
-}
-void GroupSearch::join(int a, int b) { parent_[std::max(root_of(a), root_of(b))] = std::min(root_of(a), root_of(b)); }
-
 void GroupSearch::join_by_corners() {
   const Region& support = levels_.front();
-  const std::size_t n = support.axes.size(), corners = std::size_t{1} << n;
-  std::vector<double> value(corners);
-  for (std::size_t c = 0; c < corners; ++c) {
-    Point x = centre_;
-    for (std::size_t k = 0; k < n; ++k) {
-      const int i = support.axes[k];
-      x[i] = c >> k & 1 ? support.box.upper[i] : support.box.lower[i];
-    }
-    value[c] = value_at(x);
-    has_failed_ = has_failed_ || !std::isfinite(value[c]);
+  const std::size_t n = support.axes.size();
+  std::vector<double> value;
+  for (const Point& x : make_corners(support.box)) {
+    value.push_back(value_at(x));
+    has_failed_ = has_failed_ || !std::isfinite(value.back());
   }
   for (std::size_t a = 0; a < n; ++a)
     for (std::size_t b = a + 1; b < n; ++b) {
       const std::size_t A = std::size_t{1} << a, B = std::size_t{1} << b;
-      for (std::size_t c = 0; c < corners; ++c)
+      for (std::size_t c = 0; c < value.size(); ++c)
         if (!(c & A) && !(c & B) && std::abs(value[c] - value[c | A] - value[c | B] + value[c | A | B]) > tolerance_)
-          join(static_cast<int>(a), static_cast<int>(b));
+          together_.join_under_lower(static_cast<int>(a), static_cast<int>(b));
     }
 }
 
@@ -71,7 +64,7 @@ void GroupSearch::join_by_pairs() {
   for (const double first : {0.37, 0.87})
     for (int a = 0; a < n; ++a)
       for (int b = a + 1; b < n; ++b) {
-        if (root_of(a) == root_of(b)) continue;
+        if (together_.find(a) == together_.find(b)) continue;
         // multiples of the golden section are nowhere near each other
         const auto place = [&](int axis) {
           constexpr double golden = 0.618033988749895;
@@ -89,19 +82,18 @@ void GroupSearch::join_by_pairs() {
   for (const Pair& p : pairs) {
     const double mixed = value_at(centre_) - value_at(p.x) - value_at(p.y) + value_at(p.both);
     has_failed_ = has_failed_ || !std::isfinite(mixed);
-    if (!(std::abs(mixed) <= tolerance_)) join(p.a, p.b);
+    if (!(std::abs(mixed) <= tolerance_)) together_.join_under_lower(p.a, p.b);
   }
 }
 
 void GroupSearch::list_groups() {
   groups_.clear();
-  const int n = static_cast<int>(parent_.size());
-  for (int root = 0; root < n; ++root) {
-    std::vector<int> group;
-    for (int a = 0; a < n; ++a)
-      if (root_of(a) == root) group.push_back(levels_.front().axes[a]);
+  const std::vector<int>& axes = levels_.front().axes;
+  std::vector<std::vector<int>> of_leader(axes.size());
+  for (std::size_t a = 0; a < axes.size(); ++a)
+    of_leader[static_cast<std::size_t>(together_.find(static_cast<int>(a)))].push_back(axes[a]);
+  for (std::vector<int>& group : of_leader)
     if (!group.empty()) groups_.push_back(std::move(group));
-  }
 }
 
 void GroupSearch::spread() {
@@ -109,19 +101,15 @@ void GroupSearch::spread() {
   for (const std::vector<int>& group : groups_)
     for (const Region& r : levels_) {
       if (r.axes.empty()) continue;
-      for (std::size_t c = 0; c < std::size_t{1} << group.size(); ++c) {
-        Point x = centre_;
-        for (std::size_t k = 0; k < group.size(); ++k)
-          x[group[k]] = c >> k & 1 ? r.box.upper[group[k]] : r.box.lower[group[k]];
-        points.push_back(std::move(x));
-      }
+      Box box{centre_, centre_};
+      for (const int i : group) box.lower[i] = r.box.lower[i], box.upper[i] = r.box.upper[i];
+      for (Point& x : make_corners(box)) points.push_back(std::move(x));
       const int n = static_cast<int>(group.size());
       const int count = (&r == &levels_.front() ? support_places : inner_places) * n;
       for (const Point& u : make_sobol_points(n, 1, count, seed_ + group.front())) {
-        Point x = centre_;
-        for (int k = 0; k < n; ++k)
-          x[group[k]] = r.box.lower[group[k]] + u[k] * (r.box.upper[group[k]] - r.box.lower[group[k]]);
-        points.push_back(std::move(x));
+        Point fractions(centre_.size(), 0.0);
+        for (int k = 0; k < n; ++k) fractions[group[k]] = u[k];
+        points.push_back(place_in(box, fractions));
       }
     }
   asker_.ask(points);

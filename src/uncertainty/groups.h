@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/disjoint_sets.h"
 #include "uncertainty/archive.h"
 #include "uncertainty/local_search.h"
 
@@ -42,8 +43,6 @@ class GroupSearch {
  private:
   /// NaN where it was not run, or failed.
   double value_at(const Point&) const;
-  void join(int a, int b);
-  int root_of(int axis) const;
   void join_by_corners();
   void join_by_pairs();
   void list_groups();
@@ -61,7 +60,7 @@ class GroupSearch {
   double tolerance_;
   std::uint64_t seed_;
   Point centre_;
-  std::vector<int> parent_;  // of the support's axes
+  DisjointSets together_;  // the support's axes
   bool has_failed_ = false;
   std::vector<std::vector<int>> groups_;
   std::vector<Point> composed_;  // of each level and sign
