@@ -132,20 +132,13 @@ std::string tell_briefly(double value, int digits = 2) {
   return fmt::format("{:.0f}", std::round(value * std::pow(10, places)) * std::pow(10, -places));
 }
 
-/// Whether what is not as it was asked may still become so: not what is over, has gone the wrong way, or was to stand
-/// and does not.
-bool may_become(const Context& c, const Mechanism& m) {
-  if (m.is_final || m.name == "wrong direction") return false;
-  return c.plan.criteria.mechanism != "stands" || m.name == "stands" || m.may_swing_back;
-}
-
 void add_mechanism(const Context& c, const Mechanism& m) {
   Status status = Status::Info;
   if (m.name == "wrong direction") status = Status::Bad;
   if (c.plan.criteria.mechanism) status = *c.plan.criteria.mechanism == m.name ? Status::Good : Status::Bad;
   if (c.is_under_way) status = Status::Info;
   if (status == Status::Good && !m.is_final) status = Status::NotJudged;
-  if (status == Status::Bad && c.plan.criteria.mechanism && may_become(c, m)) status = Status::NotJudged;
+  if (status == Status::Bad && c.plan.criteria.mechanism && may_change(c.plan, m)) status = Status::NotJudged;
   c.add("mechanism", "Mechanism", (c.is_under_way ? "Mechanism so far: " : "Mechanism: ") + m.name, m.text, m.tilt,
         "rad", status);
 }
@@ -895,7 +888,7 @@ void add_criteria(const Context& c, const Mechanism& m, const Standing& standing
                        : Status::Bad);
   };
   const auto falls_on = [&](bool met) -> std::string {
-    if (met ? m.is_final && c.charges_left == 0 : !may_become(c, m)) return "";
+    if (met ? m.is_final && c.charges_left == 0 : !may_change(c.plan, m)) return "";
     if (c.charges_left > 0) return kNotJudged + tell_charges_left(c);
     return fmt::format("{}it had not come to rest when the run ended.", kNotJudged);
   };
@@ -1056,6 +1049,11 @@ void add_overloads(const Context& c) {
 bool is_limit(const record::Finding& f) { return f.id.rfind("criterion.", 0) == 0 || f.id.rfind("clearance.", 0) == 0; }
 
 }  // namespace
+
+bool may_change(const product::Plan& plan, const Mechanism& m) {
+  if (m.is_final || m.name == "wrong direction") return false;
+  return plan.criteria.mechanism != "stands" || m.name == "stands" || m.may_swing_back;
+}
 
 bool is_violated(const record::Finding& f) { return is_limit(f) && f.status == Status::Bad; }
 

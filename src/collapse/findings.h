@@ -34,6 +34,9 @@ bool add_findings(const product::Plan&, const mbs::Model&, const ModelMap&, cons
                   const mbs::Summary&, record::Record&, const std::atomic<bool>* cancel = nullptr,
                   const HeadsAcross* across = nullptr);
 
+/// Whether a run ended before its mechanism was the last word: not what is over, has gone the wrong way, or was to
+/// stand and does not.
+bool may_change(const product::Plan&, const Mechanism&);
 /// Whether a finding says that a criterion or a clearance of the plan is violated.
 bool is_violated(const record::Finding&);
 /// Whether it says that one is kept so far, but could not be judged as parts still moved when the run ended.

@@ -6,6 +6,7 @@
 #include <exception>
 #include <memory>
 
+#include "collapse/findings.h"
 #include "collapse/manager.h"
 #include "collapse/plan_record.h"
 #include "collapse/recorder.h"
@@ -173,6 +174,7 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
   out.tilt = series("tilt_angle");
   const std::vector<Mechanism> verdicts = judge_structures(s.plan, s.model, s.map, k, *s.recorder, s.summary);
   out.mechanism = judge_run(verdicts, s.map, k, *s.recorder);
+  out.is_open = may_change(s.plan, out.mechanism);
   const std::vector<StageTimes> stages = find_stage_times(s.map, true);
   const std::vector<bool> counts =
       find_structures_to_stand(s.plan, s.map, stages.empty() ? out.time.back() : stages.back().first);

@@ -47,6 +47,7 @@ struct SampleRun {
   std::vector<double> time;  // of frames [s]                                                          (S)
   std::vector<double> tilt;  // towards the planned fall [rad]                                         (S)
   Mechanism mechanism;
+  bool is_open = false;    // the mechanism may become another, may_change()
   bool stood = true;       // until the last stage
   double utilisation = 0;  // largest use of a zone's resistance before the last stage; 1 if it did not stand
   double touchdown = std::numeric_limits<double>::quiet_NaN();  // of the upper block; NaN if there was none [s]

@@ -35,9 +35,12 @@ double now() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
+/// It left its place before its last stage, which stays so.
+bool is_early(const collapse::SampleRun& r, bool is_early_bad) { return !r.stood && is_early_bad; }
+
 int find_outcome(const collapse::SampleRun& r, bool is_early_bad) {
   const std::vector<std::string>& names = plan_outcomes();
-  const std::string& name = r.stood || !is_early_bad ? r.mechanism.name : names.back();
+  const std::string& name = is_early(r, is_early_bad) ? names.back() : r.mechanism.name;
   return static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
 }
 
@@ -247,6 +250,7 @@ PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k
                                                          {"rear_share", "%", 0.01},
                                                          {"utilisation", "%", 0.01}})
     if (has_sides(options) || (q.name != "reach_neg_y" && q.name != "reach_pos_y")) impl->outputs.push_back(q);
+  if (options.class_open) impl->outputs.push_back({kClassOpen, "", 1, false});
   if (options.findings) impl->outputs.push_back({"heap_height", "m", 1, false});
   if (has_clearances(options)) {
     impl->outputs.push_back({"heap_volume", "m3", 1, false});
@@ -321,6 +325,7 @@ Result PlanMapping::Impl::to_result(const collapse::SampleRun& r) const {
     out.values.push_back(x);
   if (has_sides(options)) out.values.insert(out.values.end(), {r.reach.side[2], r.reach.side[3]});
   out.values.insert(out.values.end(), {r.reach.most_mass, r.mechanism.rear_share, r.utilisation});
+  if (options.class_open) out.values.push_back(r.is_open && !is_early(r, is_early_bad) ? 1 : 0);
   if (options.findings) out.values.push_back(r.height);
   if (has_clearances(options)) {
     out.values.insert(out.values.end(), {r.volume, r.reach.largest});

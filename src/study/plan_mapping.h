@@ -33,6 +33,7 @@ struct PlanMappingOptions {
   /// Numbers of findings: height and volume of the heap, reach of debris, deviation of the fall, clearances; of
   /// condensed runs and those without `sideways` the height alone. Stores of earlier versions have runs without.
   bool findings = true;
+  bool class_open = true;  // whether a run's class may become another; stores of earlier versions have runs without
 };
 
 /// How long samples of a plan are simulated after its last stage: what its fuzzy.search says, or until its analysis
@@ -66,6 +67,8 @@ struct PlanQuantity {
   bool is_searched = true;   // runs are spent on its bounds; else they are those of the runs that there are
 };
 
+/// Output that is 1 where a run ended before its class was final, else 0.
+inline constexpr const char* kClassOpen = "class_open";
 /// way_left of parts that nothing brings to rest [m].
 inline constexpr double kUnlimited = 1e4;
 
@@ -88,7 +91,8 @@ class PlanMapping {
   /// stage's time, and `after` if there is none by then; tilt and energy in motion then (at the end without one) and at
   /// most; reach of parts beyond the footprint to each side (has_sides) and of 95 % of the mass, at the end;
   /// rear_share: drop of the rear edge over that of the front edge; utilisation: largest use of a zone's resistance
-  /// before the last stage (the margin is its inverse), 1 if it did not stand until then;
+  /// before the last stage (the margin is its inverse), 1 if it did not stand until then; class_open: 1 where the run
+  /// ended before its class was final, else 0;
   /// heap_height at the end; has_clearances: heap_volume, debris_reach as the plan's criterion has it, clearance_NAME
   /// of each neighbour as its finding has it, azimuth_deviation of the fall from the planned azimuth, where there is
   /// one (π/2 where nothing fell to any side), and way_left, the longest way that a part which still moved at the end

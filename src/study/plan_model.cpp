@@ -64,6 +64,7 @@ Definition read_definition(const std::string& text) {
   out.options.vibration = identity.value("vibration", false);
   out.options.sideways = !identity.contains("in_plane");
   out.options.findings = identity.contains("findings");
+  out.options.class_open = identity.contains(kClassOpen);
   out.options.threads = 1;
   out.rules = identity.at("rules").get<std::string>();
   std::vector<Diagnostic> warnings;
@@ -276,8 +277,9 @@ void make_random(Problem& p, const product::Plan& plan) {
   // what is told of single runs
   p.curves.clear();
   p.site = {};
-  if (p.horizon) p.horizon->output.clear();  // a point's touchdowns are those of its inner runs
+  if (p.horizon) p.horizon->output.clear(), p.horizon->open.clear();  // those of a point's inner runs
   if (!p.asked.empty()) p.not_judged.emplace_back("mechanism");
+  if (plan.criteria.stands_between_stages == true) p.not_judged.emplace_back("stands_between_stages");
   p.asked.clear();
   for (const Limit& l : p.limits) p.not_judged.push_back(l.output);
   p.limits.clear();
@@ -306,7 +308,7 @@ Problem make_plan_problem(const product::Plan& asked, const PlanMappingOptions& 
   p.site = make_site(plan);
   p.not_modelled = collapse::not_modelled(plan);
   list_debris_limits(plan, options, p);
-  if (!plan.stages.empty()) p.horizon = {"touchdown", "stands", options.after};
+  if (!plan.stages.empty()) p.horizon = {"touchdown", "stands", options.after, kClassOpen};
   p.space = mapping.space();
   if (!p.derived.empty())
     p.calc_derived = [fuzzy = plan.fuzzy](const Point& x) { return product::calc_derived(fuzzy, x); };
@@ -328,6 +330,11 @@ Problem make_plan_problem(const product::Plan& asked, const PlanMappingOptions& 
   if (options.findings) {
     json identity = json::parse(p.identity);
     identity["findings"] = true;
+    p.identity = identity.dump();
+  }
+  if (options.class_open) {
+    json identity = json::parse(p.identity);
+    identity[kClassOpen] = true;
     p.identity = identity.dump();
   }
   if (has_screening(plan, options)) {

@@ -70,6 +70,7 @@ struct Limit {
 struct Horizon {
   std::string output, unless;
   double after = 0;  // behind the last stage [s]
+  std::string open;  // output that is 1 where the outcome may become another, else 0
 };
 
 struct Problem {

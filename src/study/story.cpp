@@ -161,26 +161,33 @@ std::string tell_outputs(const Problem& p, const StudyResult& r, const uncertain
   return text;
 }
 
+/// Of a run, by the output's name; nothing where there is none.
+std::optional<double> value_of(const StudyResult& r, const uncertainty::Sample& run, const std::string& output) {
+  const auto at = std::find(r.outputs.begin(), r.outputs.end(), output);
+  const auto index = static_cast<std::size_t>(at - r.outputs.begin());
+  if (at == r.outputs.end() || index >= run.result.values.size()) return std::nullopt;
+  return run.result.values[index];
+}
+
 /// Runs that ended before anything had come down, though it was about to.
 int count_unfinished(const Problem& p, const StudyResult& r) {
   if (!p.horizon) return 0;
-  const auto at = std::find(r.outputs.begin(), r.outputs.end(), p.horizon->output);
-  if (at == r.outputs.end()) return 0;
-  const auto index = static_cast<std::size_t>(at - r.outputs.begin());
   const auto is_unfinished = [&](const uncertainty::Sample& s) {
-    return index < s.result.values.size() && s.result.values[index] >= p.horizon->after &&
+    return value_of(r, s, p.horizon->output) >= p.horizon->after &&
            name_of_outcome(r, uncertainty::outcome_of(s.result)) != p.horizon->unless;
   };
   const std::vector<uncertainty::Sample>& all = r.alpha.archive.samples();
   return static_cast<int>(std::count_if(all.begin(), all.end(), is_unfinished));
 }
 
-/// Whether a run of a plan ended while parts still moved, with an outcome that is not the last word.
-bool may_change(const Problem& p, const StudyResult& r, const uncertainty::Sample& run, const std::string& outcome) {
-  if (!p.horizon || (outcome != p.horizon->unless && outcome != "partial")) return false;
-  const auto at = std::find(r.outputs.begin(), r.outputs.end(), "way_left");
-  const auto index = static_cast<std::size_t>(at - r.outputs.begin());
-  return at != r.outputs.end() && index < run.result.values.size() && run.result.values[index] > 0;
+/// Whether a run of a plan ended with an outcome that is not the last word.
+bool is_open(const Problem& p, const StudyResult& r, const uncertainty::Sample& run) {
+  return p.horizon && value_of(r, run, p.horizon->open) > 0.0;
+}
+
+long count_open(const Problem& p, const StudyResult& r) {
+  return std::ranges::count_if(r.alpha.archive.samples(),
+                               [&](const uncertainty::Sample& run) { return is_open(p, r, run); });
 }
 
 /// The same of points whose inner runs may have ended so: only a statistic of theirs tells it.
@@ -423,10 +430,15 @@ void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Senten
   else
     s.status = runs > 0 ? Status::Warning : Status::Good;
   weigh_whole_runs(p, r, is_core_kept, s);
-  for (const std::string& name : read_permissible(p.permissible, p).outcomes)
+  const std::vector<std::string> wanted = read_permissible(p.permissible, p).outcomes;
+  for (const std::string& name : wanted)
     if (std::find(r.outcomes.begin(), r.outcomes.end(), name) == r.outcomes.end())
       s.text += fmt::format(" No run had the outcome {}.", quoted(name));
   doubt(p, r, s);
+  if (const long open = count_open(p, r); open > 0 && !wanted.empty() && s.status == Status::Good) {
+    s.text += fmt::format(" But in {} of the runs the outcome could still become another one when they ended.", open);
+    s.status = Status::Warning;
+  }
   out.push_back(std::move(s));
 }
 
@@ -600,8 +612,8 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
       status = name == p.asked ? Status::Good : Status::Bad;
     }
     // it may become another one; that others are possible weighs as before
-    const bool is_open = may_change(p, r, *core, name);
-    if (is_open && status != Status::Info) status = Status::Warning;
+    const bool is_core_open = is_open(p, r, *core);
+    if (is_core_open && status != Status::Info) status = Status::Warning;
     if (others > 0) {
       text += fmt::format(
           ". It is not certain: another outcome is {} (possibility at least {}), so its necessity "
@@ -629,7 +641,7 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
                           quoted(words_of_outcome(r, whole)));
       status = p.asked.empty() || name_of_outcome(r, whole) == p.asked ? Status::Warning : Status::Bad;
     }
-    if (is_open)
+    if (is_core_open)
       text += " With the core values parts still moved when the run ended: what it was called then may become another.";
     add("verdict", std::move(text), status);
   } else if (std::string text = tell_outputs(p, r, *core); !text.empty()) {
@@ -666,10 +678,15 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
         "Condensed runs hold until about a second behind the touchdown: reaches, heaps and outcomes at rest are not "
         "theirs. Let the runs end earlier ([fuzzy.search] after), or run the study without --condensed.",
         Status::Warning);
-  if (p.horizon)
-    add("clock", fmt::format("Times count from the last stage. Runs end at rest or {:.4g} s behind it, when parts may "
-                             "still move: reaches are those of that time.",
-                             p.horizon->after));
+  if (p.horizon) {
+    std::string text = fmt::format(
+        "Times count from the last stage. Runs end at rest or {:.4g} s behind it, when parts may "
+        "still move: reaches are those of that time.",
+        p.horizon->after);
+    if (const long open = count_open(p, r); open > 0)
+      text += fmt::format(" In {} of {} runs the outcome could still become another one then.", open, runs);
+    add("clock", std::move(text));
+  }
   if (!p.not_judged.empty()) {
     std::string list;
     for (const std::string& what : p.not_judged) list += (list.empty() ? "" : ", ") + what;

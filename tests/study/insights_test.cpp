@@ -611,7 +611,7 @@ TEST(Story, DoubtsWhatRunsSayThatEndedInTheMiddle) {
   p.asked = "topple";
   p.permissible = "topple, reach <= 5";
   p.not_judged = {"the reach of debris", "the clearance of \"Shed\""};
-  p.horizon = {"touchdown", "stands", 1.7};
+  p.horizon = {"touchdown", "stands", 1.7, ""};
   // lands in time, or not, or never
   const auto factories = make_factories([](const Point& x) {
     return done({{"reach", 1}, {"touchdown", x[0] < 0.4 ? 0.5 : 1.7}}, "topple");
@@ -633,6 +633,34 @@ TEST(Story, DoubtsWhatRunsSayThatEndedInTheMiddle) {
   by_id = tell_by_id(p, r);
   EXPECT_EQ(by_id.count("unfinished"), 0u);
   EXPECT_EQ(by_id["requirement"].status, record::Status::Good);
+}
+
+TEST(Story, DoubtsOutcomesThatMayBecomeOthers) {
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 0.5, 1)}, 200);
+  p.asked = "vertical";
+  p.permissible = "vertical";
+  p.horizon = {"touchdown", "stands", 1.7, "open"};
+  for (const double ends_below : {0.9, 0.3}) {
+    SCOPED_TRACE(ends_below);
+    const StudyResult r = run(p, folder, std::to_string(ends_below).c_str(), make_factories([=](const Point& x) {
+                                return done({{"touchdown", 0.5}, {"open", x[0] < ends_below ? 0 : 1}}, "vertical");
+                              }));
+    const auto& all = r.alpha.archive.samples();
+    const long open = std::ranges::count_if(all, [=](const auto& s) { return s.x[0] >= ends_below; });
+    ASSERT_GT(open, 0);
+    std::map<std::string, Sentence> by_id = tell_by_id(p, r);
+    const bool is_core_open = ends_below < 0.5;
+    EXPECT_EQ(by_id["verdict"].status, is_core_open ? record::Status::Warning : record::Status::Good);
+    EXPECT_EQ(by_id["verdict"].text.find("may become another") != std::string::npos, is_core_open);
+    EXPECT_EQ(by_id["requirement"].status, record::Status::Warning);
+    EXPECT_NE(by_id["requirement"].text.find(
+                  fmt::format("But in {} of the runs the outcome could still become another one", open)),
+              std::string::npos);
+    EXPECT_NE(by_id["clock"].text.find(
+                  fmt::format("In {} of {} runs the outcome could still become another", open, all.size())),
+              std::string::npos);
+  }
 }
 
 // Another outcome, failure, violation or limit at the very end of the support, at x1 = 1: possible to 0, but not
@@ -961,7 +989,7 @@ TEST(Story, TellsHowManyRunsKeepALimitOfTheDebris) {
               {"y", "Works", 6, 6, "of the plan", Kind::Clearance, "left"},
               {"y", "", 12, 12, "of the plan", Kind::Reach, ""},
               {"y", "", 12, 12, "of the plan", Kind::Reach, "left"}};
-  p.horizon = {"y", "falls", 1e3};
+  p.horizon = {"y", "falls", 1e3, ""};
   const StudyResult r = run(p, folder, "debris", make_factories([](const Point& x) {
                               return done({{"y", x[0]}, {"left", x[0] > 9 ? 5 : 0}}, "falls");
                             }));
@@ -1003,7 +1031,7 @@ TEST(Story, TellsHowManyRunsKeepALimitOfTheDebris) {
       << told[4].text;
   EXPECT_EQ(told[4].status, record::Status::Warning);
   // nothing had touched down: nothing is good
-  p.horizon = {"y", "stands", 1};
+  p.horizon = {"y", "stands", 1, ""};
   for (const Sentence& s : tell(p, r)) EXPECT_FALSE(s.id == "limit.y" && s.status == record::Status::Good) << s.text;
 }
 

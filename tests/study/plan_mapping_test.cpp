@@ -188,6 +188,8 @@ TEST(PlanMapping, TellsWhatFindingsOfARunTell) {
       ADD_FAILURE() << name;
       return 0.0;
     };
+    EXPECT_EQ(output("class_open"), finding("mechanism").status == record::Status::NotJudged);
+    EXPECT_EQ(output("class_open"), after < 2);
     EXPECT_EQ(output("debris_reach"), finding("criterion.debris_reach").value);
     EXPECT_EQ(output("clearance_house"), finding("clearance.House").value);
     EXPECT_EQ(output("clearance_yard"), finding("clearance.Yard").value);
@@ -215,7 +217,7 @@ TEST(PlanMapping, SearchesNoBoundsOfNumbersOfFindings) {
   std::vector<std::string> names;
   for (const PlanQuantity& q : m.outputs())
     if (!q.is_searched) names.push_back(q.name);
-  EXPECT_THAT(names, testing::ElementsAre("heap_height", "heap_volume", "debris_reach", "clearance_house",
+  EXPECT_THAT(names, testing::ElementsAre("class_open", "heap_height", "heap_volume", "debris_reach", "clearance_house",
                                           "clearance_yard", "azimuth_deviation", "way_left"));
 }
 

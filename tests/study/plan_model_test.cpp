@@ -220,6 +220,9 @@ TEST(PlanModel, TakesLimitsOfClearances) {
 TEST(PlanModel, ReadsDefinitionsOfEarlierVersions) {
   Problem p = make_plan_problem(read_limited("3 m"), quick());
   auto identity = nlohmann::json::parse(p.identity);
+  ASSERT_EQ(identity.erase("class_open"), 1u);
+  p.identity = identity.dump();
+  for (const Quantity& q : read_plan_problem(make_model_definition(p)).outputs) EXPECT_NE(q.name, "class_open");
   ASSERT_EQ(identity.erase("findings"), 1u);
   p.identity = identity.dump();
   const Problem old = read_plan_problem(make_model_definition(p));
