@@ -94,25 +94,29 @@ double calc_reach(const Polygon& outline, const Vec3& direction) {
   return std::isfinite(reach) ? std::max(0.0, reach) : 0;
 }
 
-/// Last way from side to side of a block that sways, by its mass centre in plan [m]: of four turning points or more
-/// since the last charge the last two are no farther to either side than those before. Else none.
-std::optional<double> find_last_swing(const MechanismInput& in) {
+/// Last way from side to side of a block that sways, in pieces of what is in its place, by its mass centre in plan [m]:
+/// of four turning points or more since the last charge the last two are no farther to either side than those before.
+/// Else none.
+std::optional<double> find_last_swing(const MechanismInput& in, const Knowledge& k) {
   constexpr double least = 0.2;  // way between turning points, of the way in all
   const auto begin =
       std::find_if(in.frames.begin(), in.frames.end(), [&in](const BlockFrame& f) { return f.time >= in.last_charge; });
   if (begin == in.frames.end()) return {};
-  Vec3 axis;
+  std::vector<Vec3> ways;
   for (auto f = begin; f != in.frames.end(); ++f) {
-    const Vec3 way{f->displacement.x - begin->displacement.x, f->displacement.y - begin->displacement.y, 0};
-    if (!(norm(way) <= norm(axis))) axis = way;
+    const Vec3 u = find_displacement(*f, k);
+    ways.push_back({u.x, u.y, 0});
   }
+  Vec3 axis;
+  for (const Vec3& way : ways)
+    if (!(norm(way - ways.front()) <= norm(axis))) axis = way - ways.front();
   const double length = norm(axis);
   if (!std::isfinite(length)) return {};
   // what round-off makes of a building at rest is no swing
   constexpr double still = 1e-6, enough_time = 0.1;  // [m, s]
   if (length < still) return in.frames.back().time - begin->time >= enough_time ? std::optional(0.0) : std::nullopt;
   std::vector<double> along;
-  for (auto f = begin; f != in.frames.end(); ++f) along.push_back(dot(f->displacement, axis) / length);
+  for (const Vec3& way : ways) along.push_back(dot(way, axis) / length);
   const auto [low, high] = std::minmax_element(along.begin(), along.end());
   const double enough = least * (*high - *low);
   std::vector<double> turns;
@@ -226,7 +230,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.text = fmt::format("The building stands: {:.1f} % of its mass came down.", 100 * out.moved);
     if (1 - last.in_place >= k.mechanism_stands_share)
       out.text += fmt::format(" {:.0f} % of its upper mass has left its place.", 100 * (1 - last.in_place));
-    if (const auto swing = in.came_to_rest ? std::nullopt : find_last_swing(in)) {
+    if (const auto swing = in.came_to_rest ? std::nullopt : find_last_swing(in, k)) {
       sways_less = true;
       if (*swing > 0)
         out.text += fmt::format(

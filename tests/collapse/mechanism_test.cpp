@@ -263,6 +263,16 @@ TEST(Mechanism, WhatSwaysLessAndLessStands) {
   EXPECT_FALSE(is_final(swinging(0, 0.05, 5)));         // not yet turned often enough
   EXPECT_FALSE(is_final(swinging(0, -0.05, 10)));       // more and more
   EXPECT_FALSE(is_final(swinging(-0.02, 0.05, 10.5)));  // leans farther from swing to swing
+  // in pieces, the largest of which sways less, while all that is in its place leans farther
+  MechanismInput apart = swinging(0, 0.05, 10.5);
+  const MechanismInput leaning = swinging(-0.02, 0.05, 10.5);
+  for (size_t i = 0; i < apart.frames.size(); ++i) {
+    apart.frames[i].connected = 0.4;
+    apart.frames[i].standing = leaning.frames[i].displacement;
+  }
+  EXPECT_FALSE(is_final(apart));
+  for (BlockFrame& f : apart.frames) f.standing = f.displacement;
+  EXPECT_TRUE(is_final(apart));
   // the last turning points are at 7 and 9 s: 0.1 (e^(-0.3) + e^(-0.4)) m
   EXPECT_THAT(judge_mechanism(swinging(0, 0.05, 10.5), default_knowledge()).text,
               testing::EndsWith("its upper block went 14.1 cm from side to side in the last swing."));
