@@ -26,7 +26,7 @@ std::string list_joints(const Model& model, std::vector<int> list) {
 namespace {
 
 // situations; a positive number is that of the rows that repeat others
-constexpr int kSingular = -1, kOpen = -2, kSpeed = -3;
+constexpr int kSingular = -1, kOpen = -2, kSpeed = -3, kTurn = -4;
 
 std::string number(double x) {
   char text[32];
@@ -89,6 +89,13 @@ void System::note_open(const JointCluster& c) {
   if (!note_once(c, kOpen)) return;
   summary.notes.push_back(list_joints(model, c.joints) + ": the step at " + number(state.time) + " s left a gap of " +
                           number(c.open) + " m or rad; a shorter step may close it");
+}
+
+void System::note_turn(const JointCluster& c, double turn) {
+  if (!note_once(c, kTurn)) return;
+  summary.notes.push_back(list_joints(model, c.joints) + ": in the step at " + number(state.time) +
+                          " s a body turns by " + number(turn) + " rad, too far for the joints to be solved as " +
+                          "elsewhere; a shorter step may do");
 }
 
 void System::stop_if_lost(const JointCluster& c) {

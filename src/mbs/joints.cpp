@@ -478,10 +478,16 @@ void System::solve_cluster(JointCluster& c, double h) {
   note_dependence(c, usual);
   const bool regular = close_cluster(c, h, true);
   bool closed = regular;
-  // a direction that comes and goes within the step, at a singular position, is left out of it
+  // a direction that comes and goes within the step, at a singular position, is left out of it; not most of what holds
+  constexpr double most_left_out = 0.25;
   for (double share = 0; share < 10 && !closed; share = share == 0 ? 0.5 : 2 * share) {
+    const double left_out = share * share * turn * turn;
+    if (left_out > most_left_out) {
+      note_turn(c, turn);
+      break;
+    }
     restore();
-    read_cluster(c, std::max(kDependent, share * share * turn * turn));
+    read_cluster(c, std::max(kDependent, left_out));
     closed = close_cluster(c, h, false);
   }
   if (!regular) note_dependence(c, usual);

@@ -624,6 +624,8 @@ class System {
   /// Tells once for each cluster that rows repeat others, that more do for a while than `usual`, or that a step did not
   /// close all joints.
   void note_dependence(const JointCluster&, int usual);
+  /// A step in which a body turns so far that what is left out to close them is no singular position [rad].
+  void note_turn(const JointCluster&, double turn);
   void note_open(const JointCluster&);
   /// The run has failed where joints are open by far.
   void stop_if_lost(const JointCluster&);

@@ -248,6 +248,22 @@ TEST(SingularPosition, SliderCrankOfEqualRodsGoesOnAlongItsBranch) {
   }
 }
 
+TEST(SingularPosition, StepsThatTurnTooFarAreNone) {
+  // a crank that turns by half a radian in a step: nothing is singular, and nothing may be left out to get on
+  for (const double h : {0.01, 0.1, 0.2}) {
+    Model m = make_slider_crank(1, 1.7, 0.5, 5);
+    m.gravity = {};
+    const Summary s = run(m, options_of(10, h));
+    const auto tells = [&s](const char* what) {
+      return std::any_of(s.notes.begin(), s.notes.end(),
+                         [what](const std::string& note) { return note.find(what) != std::string::npos; });
+    };
+    EXPECT_FALSE(tells("singular position")) << h;
+    EXPECT_EQ(tells("a body turns by"), h > 0.05) << h;
+    EXPECT_EQ(s.ending, h > 0.05 ? Summary::Ending::Diverged : Summary::Ending::TimeLimit) << h;
+  }
+}
+
 TEST(SingularPosition, BarsStretchedStraightStand) {
   // between two fixed hinges: rigid, though to second order only; nothing of the first order holds their weight, or a
   // load of a thousand times as much
