@@ -480,17 +480,19 @@ void System::solve_cluster(JointCluster& c, double h) {
   bool closed = regular;
   // a direction that comes and goes within the step, at a singular position, is left out of it; not most of what holds
   constexpr double most_left_out = 0.25;
+  bool turns_too_far = false;
   for (double share = 0; share < 10 && !closed; share = share == 0 ? 0.5 : 2 * share) {
     const double left_out = share * share * turn * turn;
-    if (left_out > most_left_out) {
-      note_turn(c, turn);
-      break;
-    }
+    turns_too_far = left_out > most_left_out;
+    if (turns_too_far) break;
     restore();
     read_cluster(c, std::max(kDependent, left_out));
     closed = close_cluster(c, h, false);
   }
-  if (!regular) note_dependence(c, usual);
+  if (turns_too_far)
+    note_turn(c, turn);
+  else if (!regular)
+    note_dependence(c, usual);
   // a branch of a mechanism that goes on has gaps of a higher order than its way
   constexpr double share_of_way = 0.01;
   const bool is_pulled =

@@ -624,9 +624,10 @@ class System {
   /// Tells once for each cluster that rows repeat others, that more do for a while than `usual`, or that a step did not
   /// close all joints.
   void note_dependence(const JointCluster&, int usual);
-  /// A step in which a body turns so far that what is left out to close them is no singular position [rad].
-  void note_turn(const JointCluster&, double turn);
   void note_open(const JointCluster&);
+  /// Tells once for each cluster of a step in which a body turns so far [rad] that it could not be closed; that is no
+  /// singular position.
+  void note_turn(const JointCluster&, double turn);
   /// The run has failed where joints are open by far.
   void stop_if_lost(const JointCluster&);
   void note_speed(const JointCluster&, double speed);

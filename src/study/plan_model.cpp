@@ -308,39 +308,26 @@ Problem make_plan_problem(const product::Plan& asked, const PlanMappingOptions& 
   p.site = make_site(plan);
   p.not_modelled = collapse::not_modelled(plan);
   list_debris_limits(plan, options, p);
-  if (!plan.stages.empty()) p.horizon = {"touchdown", "stands", options.after, kClassOpen};
+  if (!plan.stages.empty())
+    p.horizon = {"touchdown", "stands", options.after, options.class_open ? kClassOpen : "way_left"};
   p.space = mapping.space();
   if (!p.derived.empty())
     p.calc_derived = [fuzzy = plan.fuzzy](const Point& x) { return product::calc_derived(fuzzy, x); };
   p.kind = "plan";
-  p.identity = json{{"plan", plan.text},
-                    {"rules", rules},
-                    {"after", options.after},
-                    {"tilt_times", options.tilt_times},
-                    {"tilt_interval", options.tilt_interval},
-                    {"frame_rate", options.frame_rate},
-                    {"directions", options.directions}}
-                   .dump();
-  if (!has_sides(options)) {
-    json identity = json::parse(p.identity);
-    identity["in_plane"] = true;
-    p.identity = identity.dump();
-  }
+  json identity = {{"plan", plan.text},
+                   {"rules", rules},
+                   {"after", options.after},
+                   {"tilt_times", options.tilt_times},
+                   {"tilt_interval", options.tilt_interval},
+                   {"frame_rate", options.frame_rate},
+                   {"directions", options.directions}};
+  if (!has_sides(options)) identity["in_plane"] = true;
+  if (options.findings) identity["findings"] = true;
+  if (options.class_open) identity[kClassOpen] = true;
+  if (has_screening(plan, options)) identity["vibration"] = true;
+  if (options.condensed) identity["condensed"] = true;
   p.settings = json{{"path", plan.path}}.dump();
-  if (options.findings) {
-    json identity = json::parse(p.identity);
-    identity["findings"] = true;
-    p.identity = identity.dump();
-  }
-  if (options.class_open) {
-    json identity = json::parse(p.identity);
-    identity[kClassOpen] = true;
-    p.identity = identity.dump();
-  }
   if (has_screening(plan, options)) {
-    json identity = json::parse(p.identity);
-    identity["vibration"] = true;
-    p.identity = identity.dump();
     list_vibration_limits(plan, p.limits);
   } else if (plan.vibration) {
     for (const product::Neighbour& n : plan.neighbours)
@@ -356,10 +343,8 @@ Problem make_plan_problem(const product::Plan& asked, const PlanMappingOptions& 
     p.whole = std::make_shared<const Problem>(make_plan_problem(asked, whole, rules));
     p.confirm = default_confirm;
     p.not_modelled.push_back("Frames that are alike move as one, in their plane: nothing falls sideways.");
-    json identity = json::parse(p.identity);
-    identity["condensed"] = true;
-    set_plan_identity(p, identity.dump());
   }
+  set_plan_identity(p, identity.dump());
   if (!plan.fuzzy.random.empty()) make_random(p, plan);
   p.levels = plan.fuzzy.search.levels;
   p.limit = plan.fuzzy.search.limit;

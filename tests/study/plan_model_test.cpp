@@ -222,7 +222,9 @@ TEST(PlanModel, ReadsDefinitionsOfEarlierVersions) {
   auto identity = nlohmann::json::parse(p.identity);
   ASSERT_EQ(identity.erase("class_open"), 1u);
   p.identity = identity.dump();
-  for (const Quantity& q : read_plan_problem(make_model_definition(p)).outputs) EXPECT_NE(q.name, "class_open");
+  const Problem before = read_plan_problem(make_model_definition(p));
+  for (const Quantity& q : before.outputs) EXPECT_NE(q.name, "class_open");
+  EXPECT_EQ(before.horizon->open, "way_left");
   ASSERT_EQ(identity.erase("findings"), 1u);
   p.identity = identity.dump();
   const Problem old = read_plan_problem(make_model_definition(p));
