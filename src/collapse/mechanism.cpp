@@ -245,7 +245,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
                  : fmt::format("It leans: the mass centre of the upper block has moved to a side by {:.2f} m.", aside);
   } else if (in.came_to_rest && has_left && (!ends_in_pieces || out.moved < k.mechanism_partial_share) &&
              final_tilt < k.mechanism_aborted_rotation && height_left > 0.5) {
-    out.name = "partial";
+    out.name = "aborted";
     out.text = has_sunk
                    ? fmt::format(
                          "Aborted collapse: the upper block has sunk by {:.2f} m and stands, leaning by {:.1f} deg, "
@@ -262,7 +262,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.name = "partial";
     out.text = fmt::format("Partial collapse: {}.", motion);
   } else if (in.came_to_rest && final_tilt < k.mechanism_aborted_rotation && height_left > 0.5) {
-    out.name = "partial";
+    out.name = "aborted";
     out.text = fmt::format("Aborted collapse: at rest, leaning by {:.1f} deg with {:.0f} % of its height left; {}.",
                            final_tilt / unit::deg, 100 * height_left, motion);
   } else if (at.forward >= k.mechanism_fold_share && at.backward >= k.mechanism_fold_share) {
@@ -289,11 +289,12 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.name = "topple";
     out.text = fmt::format("It topples: {}.", motion);
   }
-  if (lands_in_pieces && out.name != "stands" && out.name != "partial" && out.name != "progressive")
+  const bool stays = out.name == "stands" || out.name == "partial" || out.name == "aborted";
+  if (lands_in_pieces && !stays && out.name != "progressive")
     out.text +=
         fmt::format(" It is in pieces then, the largest of {:.0f} % of the upper mass: these numbers are of all.",
                     100 * at.connected);
-  if (at.apart > 0.005 && out.name != "stands" && out.name != "partial")
+  if (at.apart > 0.005 && !stays)
     out.text += fmt::format(" Before, {:.0f} % of the upper mass had fallen off: these numbers are of the rest.",
                             100 * at.apart);
   if (turns_about_foot && (out.name == "topple" || out.name == "wrong direction"))

@@ -67,7 +67,7 @@ struct Fall {
 };
 
 struct Mechanism {
-  std::string name;  // "topple", "fold", "vertical", "progressive", "partial", "wrong direction", "stands"
+  std::string name;  // "topple", "fold", "vertical", "progressive", "partial", "aborted", "wrong direction", "stands"
   std::string text;  // a sentence with its numbers
   double time = 0;   // of judgement: the touchdown that decides, else the end [s]
   bool has_touchdown = false;

@@ -80,7 +80,7 @@ std::string tell_late_charge(const LateCharge& late, const std::string& with, do
 }  // namespace
 
 const std::vector<std::string>& plan_outcomes() {
-  static const std::vector<std::string> names{"topple", "vertical",    "partial",         "stands",
+  static const std::vector<std::string> names{"topple", "vertical",    "partial",         "aborted", "stands",
                                               "fold",   "progressive", "wrong direction", "early"};
   return names;
 }

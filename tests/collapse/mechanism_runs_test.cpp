@@ -141,14 +141,14 @@ TEST(MechanismRunPhysics, ABinThatSinksAndStandsIsAborted) {
   // from 1.5 m on its floors come off as it lands, and what stands then hangs on the step
   for (const char* length : {"0.3 m", "0.6 m", "1.2 m"}) {
     const auto m = find_mechanism(bin(4) + fire({"C-*-0"}, length), "8 s");
-    EXPECT_EQ(m.title, "Mechanism: partial") << length << ": " << m.text;
+    EXPECT_EQ(m.title, "Mechanism: aborted") << length << ": " << m.text;
     EXPECT_THAT(m.text, HasSubstr("Aborted collapse: the upper block has sunk by")) << length;
   }
 }
 
 TEST(MechanismRunPhysics, ATowerThatDropsAndStandsIsAborted) {
   const auto m = find_mechanism(bin(10) + fire({"C-*-0"}, "0.6 m"), "8 s");
-  EXPECT_EQ(m.title, "Mechanism: partial") << m.text;
+  EXPECT_EQ(m.title, "Mechanism: aborted") << m.text;
   // it falls through the destroyed length and a little further, where stumps crush
   EXPECT_THAT(m.text, HasSubstr("has sunk by 0.6"));
 }

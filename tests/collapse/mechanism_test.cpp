@@ -289,7 +289,9 @@ TEST(Mechanism, WhatLeansIsNotSaidToSink) {
   EXPECT_FALSE(sinks.may_swing_back);
   MechanismInput at_rest = swaying(0.44, 0.033);
   at_rest.came_to_rest = true;
-  EXPECT_THAT(judge_mechanism(at_rest, default_knowledge()).text,
+  const Mechanism aborted = judge_mechanism(at_rest, default_knowledge());
+  EXPECT_EQ(aborted.name, "aborted");
+  EXPECT_THAT(aborted.text,
               testing::StartsWith("Aborted collapse: the upper block has moved to a side by 0.44 m and stands"));
 }
 
@@ -310,7 +312,7 @@ TEST(Mechanism, AtRestWhileLeaningIsAborted) {
   in.came_to_rest = true;
   in.frames.back().height = 10;
   const Mechanism m = judge_mechanism(in, default_knowledge());
-  EXPECT_EQ(m.name, "partial");
+  EXPECT_EQ(m.name, "aborted");
   EXPECT_THAT(m.text, testing::StartsWith("Aborted collapse"));
 }
 
@@ -364,7 +366,7 @@ TEST(Mechanism, PiecesThatHaveSunkDoNotStand) {
               testing::StartsWith("It has begun to sink: the upper block has come down by 0.41 m."));
   in.came_to_rest = true;
   const Mechanism m = judge_mechanism(in, default_knowledge());
-  EXPECT_EQ(m.name, "partial");
+  EXPECT_EQ(m.name, "aborted");
   EXPECT_THAT(m.text, testing::StartsWith("Aborted collapse: the upper block has sunk by 0.41 m and stands"));
   EXPECT_THAT(m.text, testing::HasSubstr("It is in pieces, the largest of 35 % of the upper mass"));
   // where most of it is in its place the building stands, but not all of it

@@ -12,6 +12,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["vertical", "Einsturz in sich"],
   ["progressive", "fortschreitender Einsturz"],
   ["partial", "Teileinsturz"],
+  ["aborted", "steckengebliebener Einsturz"],
   ["wrong direction", "falsche Richtung"],
   ["stands", "bleibt stehen"],
   ["falls", "fällt"],
