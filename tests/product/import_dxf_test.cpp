@@ -228,5 +228,109 @@ TEST(ImportDxfLines, EndInAnyOfThreeWays) {
   }
 }
 
+std::string block(const std::string& name, const std::string& base, const std::string& entities) {
+  return "0\nBLOCK\n8\n0\n2\n" + name + "\n70\n0\n" + base + entities + "0\nENDBLK\n8\n0\n";
+}
+std::string with_blocks(const std::string& blocks, const std::string& entities) {
+  return "0\nSECTION\n2\nBLOCKS\n" + blocks + "0\nENDSEC\n" + drawing(entities);
+}
+std::string insertion(const std::string& name, const std::string& layer, const std::string& codes) {
+  return "0\nINSERT\n8\n" + layer + "\n2\n" + name + "\n" + codes;
+}
+const std::vector<Corner> kHouse{{1, 1}, {5, 1}, {5, 3}, {1, 3}};
+
+void expect_corners(const std::string& text, const std::vector<Corner>& wanted) {
+  const auto found = corners_of(text);
+  ASSERT_EQ(found.size(), wanted.size()) << text;
+  for (size_t i = 0; i < wanted.size(); ++i) {
+    EXPECT_NEAR(found[i].x, wanted[i].x, 6e-4) << i << text;
+    EXPECT_NEAR(found[i].y, wanted[i].y, 6e-4) << i << text;
+  }
+}
+
+TEST(ImportDxfBlocks, LieWhereTheyAreInserted) {
+  // base point (1, 1) to (10, 20), twice and three times as large, then turned by a quarter
+  const std::string text = with_blocks(block("House", "10\n1\n20\n1\n", outline("0", kHouse)),
+                                       insertion("HOUSE", "Buildings", "10\n10\n20\n20\n41\n2\n42\n3\n50\n90\n"));
+  const Import made = make_site_text(text, "site.dxf", 1);
+  expect_corners(made.text, {{10, 20}, {10, 28}, {4, 28}, {4, 20}});
+  EXPECT_THAT(made.text, HasSubstr("name = \"Buildings 1\""));
+  EXPECT_THAT(made.report.guessed, Contains(HasSubstr("symbol only: 1 HOUSE")));
+  EXPECT_THAT(made.report.taken, Contains("1 closed outlines"));
+  // in decimetres
+  expect_corners(make_site_text(text, "site.dxf", 0.1).text, {{1, 2}, {1, 2.8}, {0.4, 2.8}, {0.4, 2}});
+}
+
+TEST(ImportDxfBlocks, KeepTheirOwnLayersAndAreSeenFromBelow) {
+  const Import made = make_site_text(
+      with_blocks(block("H", "", outline("Gasleitung", kHouse)), insertion("H", "B", "10\n10\n20\n0\n230\n-1\n")),
+      "site.dxf", 1);
+  EXPECT_THAT(made.text, HasSubstr("[[site.utility]]\nname = \"Gasleitung 1\""));
+  expect_corners(made.text, {{-11, 1}, {-15, 1}, {-15, 3}, {-11, 3}});
+}
+
+TEST(ImportDxfBlocks, HoldBlocksInRowsAndColumns) {
+  // a row of two houses 10 apart, put in a grid of 2 x 3 that is turned by a quarter
+  const std::string row = insertion("H", "0", "10\n0\n20\n0\n") + insertion("H", "0", "10\n10\n20\n0\n");
+  const Import made = make_site_text(with_blocks(block("H", "", outline("0", kHouse)) + block("ROW", "", row),
+                                                 insertion("ROW", "Plan", "50\n90\n70\n3\n71\n2\n44\n40\n45\n7\n")),
+                                     "site.dxf", 1);
+  EXPECT_THAT(made.report.taken, Contains("12 closed outlines"));
+  EXPECT_THAT(made.report.guessed, Contains(HasSubstr("symbol only: 12 ROW")));
+  // the last: house 2 of column 3 and row 2, (1, 1) + (10, 0) + (80, 7) turned
+  EXPECT_THAT(made.text, HasSubstr("name = \"Plan 12\"\nfootprint = [[\"-8.000 m\", \"91.000 m\"]"));
+}
+
+TEST(ImportDxfBlocks, HoldEllipsesOfCircles) {
+  // in the block's own unit a circle of 0.05; 400 and 200 times as large, mirrored and turned by 30 degrees
+  const std::string circle = "0\nCIRCLE\n8\nTank\n10\n0\n20\n0\n40\n0.05\n";
+  const Import made = make_site_text(
+      with_blocks(block("T", "", circle), insertion("T", "0", "10\n100\n20\n50\n41\n-400\n42\n200\n50\n30\n")),
+      "site.dxf", 1);
+  const auto found = corners_of(made.text);
+  EXPECT_NEAR(std::abs(area_of(found)), kPi * 20 * 10, 0.003 * kPi * 200);
+  for (int k = 0; k < 360; ++k) {
+    const double a = k * kPi / 180, x = 19.99 * std::cos(a), y = 9.99 * std::sin(a), c = std::cos(kPi / 6);
+    EXPECT_TRUE(holds(found, 100 + c * x - 0.5 * y, 50 + 0.5 * x + c * y)) << k;
+  }
+}
+
+TEST(ImportDxfBlocks, AreLeftOutWhereTheyCannotLieInThePlan) {
+  const std::string house = block("H", "", outline("0", kHouse)) + block("XREF", "", "");
+  const Import made =
+      make_site_text(with_blocks(house, insertion("H", "A", "") + insertion("H", "A", "67\n1\n") +
+                                            insertion("H", "A", "210\n1\n230\n1\n") + insertion("H", "A", "41\n0\n") +
+                                            insertion("XREF", "A", "") + insertion("GONE", "A", "") +
+                                            "0\nATTRIB\n1\ntext\n0\nSEQEND\n8\nA\n"),
+                     "site.dxf", 1);
+  EXPECT_THAT(made.report.taken, Contains("1 closed outlines"));
+  for (const char* left : {"1 outlines in paper space", "1 outlines that do not lie flat", "1 outlines without area"})
+    EXPECT_THAT(made.report.missing, Contains(std::string(left) + " are left out"));
+  EXPECT_THAT(made.report.missing, Contains(HasSubstr("are left out: 1 GONE, 1 XREF")));
+  EXPECT_THAT(made.report.missing, Not(Contains(HasSubstr("SEQEND"))));
+}
+
+TEST(ImportDxfBlocks, ThatGrowWithoutEndAreRefused) {
+  const auto message = [](const std::string& text) -> std::string {
+    try {
+      make_site_text(text, "site.dxf", 1);
+    } catch (const InputError& e) { return e.diagnostics()[0].message; }
+    return "none";
+  };
+  EXPECT_EQ(message(with_blocks(block("A", "", insertion("B", "0", "")) + block("B", "", insertion("a", "0", "")),
+                                insertion("A", "0", ""))),
+            "the block A is inserted into itself");
+  const std::string many = "70\n1000\n71\n1000\n";
+  EXPECT_EQ(message(with_blocks(block("A", "", outline("0", kHouse)), insertion("A", "0", many))),
+            "blocks make more than 100000 outlines");
+  // each twice the one within it
+  std::string blocks = block("B0", "", outline("0", kHouse));
+  for (int i = 1; i < 40; ++i) {
+    const std::string inner = insertion("B" + std::to_string(i - 1), "0", "");
+    blocks += block("B" + std::to_string(i), "", inner + inner);
+  }
+  EXPECT_EQ(message(with_blocks(blocks, insertion("B39", "0", ""))), "blocks make more than 100000 outlines");
+}
+
 }  // namespace
 }  // namespace topple::product
