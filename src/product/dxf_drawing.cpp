@@ -351,7 +351,7 @@ class Placing {
         const PlaneMap turned = PlaneMap{c, -s, s, c, i.at[0], i.at[1]} * to_base;
         put(found->second, {way.place * PlaneMap{side, 0, 0, 1, 0, 0} * turned, way.height * i.scale[2],
                             way.is_on_paper || i.is_on_paper, way.is_tilted || is_tilted(i.extrusion),
-                            layer_of(i.layer, way), way.block.empty() ? i.block : way.block});
+                            layer_of(i.layer, way), i.block});
       }
     open_.pop_back();
   }

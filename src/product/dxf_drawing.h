@@ -33,7 +33,7 @@ struct PlaneMap {
 struct DxfOutline {
   int line = 1;  // where it begins
   std::string layer;
-  std::string block;  // that is inserted with it, the outermost one; empty: it lies in the drawing itself
+  std::string block;  // that holds it; empty: it lies in the drawing itself
   bool is_closed = false, is_on_paper = false, is_mesh = false, is_tilted = false, lacks_y = false;
   std::vector<std::array<double, 2>> corners;  // of its block, before `place`
   std::vector<double> bulges;   // of the edge behind each corner: tan of a quarter of its arc's angle; 0: straight

@@ -276,7 +276,7 @@ TEST(ImportDxfBlocks, HoldBlocksInRowsAndColumns) {
                                                  insertion("ROW", "Plan", "50\n90\n70\n3\n71\n2\n44\n40\n45\n7\n")),
                                      "site.dxf", 1);
   EXPECT_THAT(made.report.taken, Contains("12 closed outlines"));
-  EXPECT_THAT(made.report.guessed, Contains(HasSubstr("symbol only: 12 ROW")));
+  EXPECT_THAT(made.report.guessed, Contains(HasSubstr("symbol only: 12 H")));
   // the last: house 2 of column 3 and row 2, (1, 1) + (10, 0) + (80, 7) turned
   EXPECT_THAT(made.text, HasSubstr("name = \"Plan 12\"\nfootprint = [[\"-8.000 m\", \"91.000 m\"]"));
 }
