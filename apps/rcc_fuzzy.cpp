@@ -12,6 +12,7 @@
 #include "nearfield/moment_curve.h"
 #include "nearfield/rcc.h"
 #include "rcc_report.h"
+#include "study/tie.h"
 #include "uncertainty/alpha.h"
 #include "uncertainty/fan.h"
 #include "uncertainty/possibility.h"
@@ -81,6 +82,7 @@ struct Model {
 uncertainty::Space make_space(const product::FuzzyFile& f) {
   uncertainty::Space space;
   for (const product::FuzzyValue& v : f.inputs) space.inputs.push_back(uncertainty::make_polygonal(v.corners));
+  study::tie(space, f.interaction, [f](const uncertainty::Point& x) { return product::calc_interacting(f, x); });
   return space;
 }
 
@@ -196,6 +198,8 @@ std::optional<record::RccFuzzyReport> make_fuzzy_report(const product::SectionFi
     r.inputs.push_back({v.path, v.name, v.symbol, v.unit, v.corners, {}});
   for (const product::DerivedValue& d : file.derived)
     r.inputs.push_back({d.path, d.name, d.symbol, d.unit, {}, d.text});
+  for (const product::Constraint& c : file.interaction.constraints) r.constraints.push_back(c.text);
+  r.joint = file.interaction.joint_text;
 
   // the force that crushes it; a smooth function, so more levels cost little
   uncertainty::AlphaOptions crushing = options;

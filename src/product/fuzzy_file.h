@@ -8,6 +8,7 @@
 
 #include "product/document.h"
 #include "product/fuzzy_values.h"
+#include "product/interaction.h"
 #include "product/section_file.h"
 
 namespace topple::product {
@@ -25,6 +26,7 @@ struct FuzzyFile : FuzzySearch {
   std::vector<DerivedValue> derived;
   std::vector<ValuePlace> places;    // of the inputs, then of the derived values
   std::vector<double> formula_unit;  // SI value of one unit in formulas: inputs, derived, then crisp values
+  Interaction interaction;           // of inputs and derived values, in formula units
   std::vector<double> crisp;         // other values of the section that formulas may use, in formula units
   Node section;                      // the section file, parsed
 };
@@ -41,5 +43,7 @@ FuzzyFile read_fuzzy_file(const std::string& path, const SectionFile&, std::vect
 SectionFile make_sample(const SectionFile&, const FuzzyFile&, std::span<const double> point);
 /// The derived values of a point in SI.
 std::vector<double> calc_derived(const FuzzyFile&, std::span<const double> point);
+/// What the interaction sees of a point: inputs and derived values in formula units.
+std::vector<double> calc_interacting(const FuzzyFile&, std::span<const double> point);
 
 }  // namespace topple::product

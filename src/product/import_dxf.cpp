@@ -137,7 +137,8 @@ std::string why_not(const DxfOutline& o) {
 /// "3 A, 1 B"
 std::string list_numbers(const std::map<std::string, int>& numbers) {
   std::string out;
-  for (const auto& [name, number] : numbers) out += fmt::format("{}{} {}", out.empty() ? "" : ", ", number, clean_text(name));
+  for (const auto& [name, number] : numbers)
+    out += fmt::format("{}{} {}", out.empty() ? "" : ", ", number, clean_text(name));
   return out;
 }
 

@@ -22,7 +22,7 @@ std::optional<Constraint> read_constraint(const Node& item, const std::string& l
   const auto left = parse_formula(item, 0, sign, label + ": constraint", names, complaints);
   const auto right = parse_formula(item, sign + 2, std::string::npos, label + ": constraint", names, complaints);
   if (!left || !right) return std::nullopt;
-  return Constraint{*left, *right, item.text[sign] == '>', item.place};
+  return Constraint{*left, *right, item.text[sign] == '>', item.place, item.text};
 }
 
 /// Whether what a formula uses has values; where one has none the run fails, which is no matter of the interaction.
@@ -48,6 +48,12 @@ double calc_joint(const Interaction& interaction, std::span<const double> values
   return mu >= 1 - Interaction::slack ? 1 : std::max(mu, 0.0);
 }
 
+bool is_possible(const Interaction& interaction, std::span<const double> values) {
+  for (size_t i = 0; i < interaction.constraints.size(); ++i)
+    if (calc_excess(interaction, i, values) > 0) return false;
+  return calc_joint(interaction, values) > 0;
+}
+
 Interaction read_interaction(TableReader& parent, const std::vector<std::string>& names) {
   Interaction out;
   const Node* node = parent.table("interaction");
@@ -63,7 +69,7 @@ Interaction read_interaction(TableReader& parent, const std::vector<std::string>
     }
   }
   if (const Node* text = table.find("membership")) {
-    out.joint_place = text->place;
+    out.joint_place = text->place, out.joint_text = text->text;
     if (text->kind != Node::Kind::String)
       table.error("E202", text->place, "membership: a formula is wanted");
     else

@@ -17,12 +17,14 @@ struct Constraint {
   Expression left, right;
   bool is_at_least = false;
   Place place;
+  std::string text;
 };
 
 struct Interaction {
   std::vector<Constraint> constraints;
   std::optional<Expression> joint;
   Place joint_place;
+  std::string joint_text;
   /// Round-off of formulas and units, in parts of the sides: an equation as two constraints has places.
   static constexpr double slack = 1e-12;
 
@@ -34,6 +36,9 @@ struct Interaction {
 double calc_excess(const Interaction&, size_t constraint, std::span<const double> values);
 /// The joint membership, in [0, 1]: 0 where its formula has no value, 1 without a formula.
 double calc_joint(const Interaction&, std::span<const double> values);
+
+/// Whether a sample with these values counts: every constraint is kept and the joint membership is above 0.
+bool is_possible(const Interaction&, std::span<const double> values);
 
 /// The table [interaction], whose formulas may use `names`.
 Interaction read_interaction(TableReader& parent, const std::vector<std::string>& names);

@@ -89,11 +89,7 @@ std::vector<double> calc_interacting(const FuzzyPlan& f, std::span<const double>
 }
 
 bool is_possible(const FuzzyPlan& f, std::span<const double> point) {
-  if (f.interaction.is_empty()) return true;
-  const std::vector<double> values = calc_interacting(f, point);
-  for (size_t i = 0; i < f.interaction.constraints.size(); ++i)
-    if (calc_excess(f.interaction, i, values) > 0) return false;
-  return calc_joint(f.interaction, values) > 0;
+  return f.interaction.is_empty() || is_possible(f.interaction, calc_interacting(f, point));
 }
 
 std::vector<double> calc_centre(const FuzzyPlan& f) { return centre_of(f.inputs); }

@@ -173,6 +173,7 @@ void Reader::parse_formulas() {
 void Reader::try_samples(std::vector<Diagnostic>& warnings) {
   const size_t n = out.inputs.size();
   const auto refusal = [&](const std::vector<double>& point) -> std::string {
+    if (!is_possible(out.interaction, calc_interacting(out, point))) return {};  // no sample is there
     const std::vector<double> derived = calc_derived(out, point);
     for (size_t i = 0; i < derived.size(); ++i)
       if (!std::isfinite(derived[i])) return out.derived[i].path + ": the formula has no value there";
@@ -224,6 +225,14 @@ std::vector<double> calc_derived(const FuzzyFile& f, std::span<const double> poi
   return out;
 }
 
+std::vector<double> calc_interacting(const FuzzyFile& f, std::span<const double> point) {
+  std::vector<double> values(point.begin(), point.end());
+  const std::vector<double> derived = calc_derived(f, point);
+  values.insert(values.end(), derived.begin(), derived.end());
+  for (size_t i = 0; i < values.size(); ++i) values[i] /= f.formula_unit[i];
+  return values;
+}
+
 SectionFile make_sample(const SectionFile& section, const FuzzyFile& f, std::span<const double> point) {
   Node document = f.section;
   for (size_t i = 0; i < f.inputs.size(); ++i) set_value(document, f.places[i], point[i]);
@@ -251,6 +260,10 @@ FuzzyFile read_fuzzy_text(const std::string& text, const std::string& name, cons
   out.title = root.text("title", section.title);
   Reader reader{section, out, complaints, {}};
   for (const char* group : {"concrete", "steel", "section", "zone"}) reader.read_group(root, group);
+  std::vector<std::string> names;
+  for (const FuzzyValue& v : out.inputs) names.push_back(v.name);
+  for (const DerivedValue& d : out.derived) names.push_back(d.name);
+  out.interaction = read_interaction(root, names);
   static_cast<FuzzySearch&>(out) = read_search(root);
   root.finish();
   if (complaints.error_count() == 0 && out.inputs.empty())
@@ -259,6 +272,11 @@ FuzzyFile read_fuzzy_text(const std::string& text, const std::string& name, cons
   if (out.inputs.size() > most_fuzzy_inputs)
     complaints.error("E209", document.place, fmt::format("more than {} fuzzy inputs", most_fuzzy_inputs));
   if (complaints.error_count() == 0) reader.parse_formulas();
+  if (complaints.error_count() == 0) {
+    const std::vector<double> values = calc_interacting(out, centre_of(out.inputs));
+    if (std::ranges::all_of(values, [](double v) { return std::isfinite(v); }))
+      check_interaction(out.interaction, values, "interaction", "the fuzzy inputs", complaints);
+  }
   if (complaints.error_count() == 0) reader.try_samples(warnings);
   complaints.sort();
   if (complaints.error_count() > 0) throw InputError(complaints.all());

@@ -286,10 +286,14 @@ Figure make_inputs(const RccFuzzyReport& r) {
     p.lines.push_back(std::move(line));
     ++k;
   }
+  for (const std::string& c : r.constraints) out.table.rows.push_back({"interaction", "", c, "a constraint"});
+  if (!r.joint.empty()) out.table.rows.push_back({"interaction", "", r.joint, "of all together"});
   p.x_low = low - 0.05 * (high - low), p.x_high = high + 0.05 * (high - low);
   out.id = "inputs";
   out.heading = "Fuzzy inputs";
-  out.caption = "What is possible, and to which degree. Values that follow by a formula are in the table.";
+  out.caption =
+      "What is possible, and to which degree. Values that follow by a formula, and what ties values together, are in "
+      "the table.";
   out.drawing = draw(p);
   return out;
 }
@@ -383,6 +387,8 @@ std::string to_json(const RccFuzzyReport& r) {
     }
     j["inputs"].push_back(std::move(one));
   }
+  if (!r.constraints.empty() || !r.joint.empty())
+    j["interaction"] = {{"constraints", r.constraints}, {"membership", r.joint}};
   j["crushing_force"] = json::array();
   for (const RccInterval& i : r.crushing) j["crushing_force"].push_back(to_json(i));
   j["tearing_force"] = json::array();

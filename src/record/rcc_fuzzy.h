@@ -75,9 +75,11 @@ struct RccFuzzyReport {
   char axis = 'y';
   int direction = 1;
   std::uint64_t seed = 1;
-  std::vector<RccFuzzyInput> inputs;  // fuzzy ones, then derived ones
-  std::vector<RccInterval> crushing;  // force that crushes the section without bending [N]
-  std::vector<RccInterval> tearing;   // that tears it, tension positive; none: no fan is of tension [N]
+  std::vector<RccFuzzyInput> inputs;     // fuzzy ones, then derived ones
+  std::vector<std::string> constraints;  // what ties them together, as it is written
+  std::string joint;                     // the same: their joint membership
+  std::vector<RccInterval> crushing;     // force that crushes the section without bending [N]
+  std::vector<RccInterval> tearing;      // that tears it, tension positive; none: no fan is of tension [N]
   std::vector<RccFan> fans;
   std::vector<KeyValue> section;
   std::vector<std::string> notes, not_modelled;

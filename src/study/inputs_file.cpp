@@ -14,6 +14,7 @@
 #include "product/read_fuzzy_values.h"
 #include "product/table_reader.h"
 #include "study/randomness.h"
+#include "study/tie.h"
 
 namespace topple::study {
 namespace {
@@ -266,12 +267,7 @@ struct Reader {
           if (!is_random[i]) derived.push_back(values[i]);
         return derived;
       };
-    const auto shared = std::make_shared<const product::Interaction>(interaction);
-    for (std::size_t i = 0; i < shared->constraints.size(); ++i)
-      out.space.constraints.emplace_back(
-          [complete, shared, i](const Point& x) { return product::calc_excess(*shared, i, complete(x)); });
-    if (shared->joint)
-      out.space.joint = [complete, shared](const Point& x) { return product::calc_joint(*shared, complete(x)); };
+    tie(out.space, interaction, complete);
     const Point centre = uncertainty::calc_centre(out.space);
     const std::vector<double> values = complete(centre);
     for (std::size_t i = 0; i < formulas.size(); ++i)

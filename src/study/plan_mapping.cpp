@@ -20,6 +20,7 @@
 #include "collapse/plan_record.h"
 #include "collapse/sample_runs.h"
 #include "product/plan_sampler.h"
+#include "study/tie.h"
 
 namespace topple::study {
 
@@ -42,20 +43,6 @@ int find_outcome(const collapse::SampleRun& r, bool is_early_bad) {
   const std::vector<std::string>& names = plan_outcomes();
   const std::string& name = is_early(r, is_early_bad) ? names.back() : r.mechanism.name;
   return static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
-}
-
-/// The plan's constraints and joint membership.
-void tie(uncertainty::Space& space, const product::FuzzyPlan& plan) {
-  if (plan.interaction.is_empty()) return;
-  const auto shared = std::make_shared<const product::FuzzyPlan>(plan);
-  for (size_t i = 0; i < plan.interaction.constraints.size(); ++i)
-    space.constraints.emplace_back([shared, i](const Point& x) {
-      return product::calc_excess(shared->interaction, i, product::calc_interacting(*shared, x));
-    });
-  if (plan.interaction.joint)
-    space.joint = [shared](const Point& x) {
-      return product::calc_joint(shared->interaction, product::calc_interacting(*shared, x));
-    };
 }
 
 struct LateCharge {
@@ -234,7 +221,9 @@ PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k
     impl->inputs.push_back({v.path, v.symbol, v.unit});
     impl->space.inputs.push_back(uncertainty::make_polygonal(v.corners));
   }
-  tie(impl->space, plan.fuzzy);
+  if (!plan.fuzzy.interaction.is_empty())
+    tie(impl->space, plan.fuzzy.interaction,
+        [fuzzy = plan.fuzzy](const Point& x) { return product::calc_interacting(fuzzy, x); });
   uncertainty::check_space(impl->space);
   check_firing(plan, *impl);
   for (const double t : options.tilt_times) impl->outputs.push_back({fmt::format("tilt_{:g}", t), "deg", unit::deg});

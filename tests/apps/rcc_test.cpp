@@ -303,6 +303,41 @@ TEST(RccFuzzyCommand, FanIsNestedAndHoldsItsOriginals) {
   EXPECT_EQ(read_table(folder / "fan.csv").size(), 1u + 3 * J);
 }
 
+TEST(RccFuzzyCommand, InteractionCutsTheInputs) {
+  // what ties values together leaves the same as inputs that end there
+  const OwnFolder own;
+  const auto bounds = [&](const std::string& name, const std::string& areas, const std::string& interaction) {
+    const std::string inputs = own / "inputs.toml";
+    replace_file(inputs,
+                 "steel.fy = { triangular = [\"380 N/mm2\", \"420 N/mm2\", \"460 N/mm2\"] }\n"
+                 "section.steel_area = { triangular = " +
+                     areas + " }\n" + interaction + "[search]\nlevels = [0, 0.5, 1]\nsamples = 2000\n");
+    const fs::path folder = run(name, "--normal-force \"1 MN\" --fuzzy " + inputs);
+    const auto j = nlohmann::json::parse(read_file((folder / "fuzzy.json").string()));
+    std::vector<double> out;
+    for (const auto& cut : j["fans"][0]["ordinates"][0]["cuts"])
+      for (const char* end : {"left", "right"}) out.push_back(cut[end].get<double>());
+    const std::string page = read_file((folder / "fuzzy.html").string());
+    EXPECT_EQ(page.find("steel_area &lt;= 6400") != std::string::npos, interaction.find("<=") != std::string::npos);
+    return out;
+  };
+  const std::string wide = "[\"50 cm2\", \"64 cm2\", \"80 cm2\"]";
+  const auto whole = bounds("tied_not", wide, "");
+  const auto below = bounds("tied_below", wide, "[interaction]\nconstraints = [\"steel_area <= 6400\"]\n");
+  const auto joint =
+      bounds("tied_joint", wide, "[interaction]\nmembership = \"max(0, 1 - abs(steel_area - 6400) / 600)\"\n");
+  const auto cut = bounds("cut_below", "[\"50 cm2\", \"64 cm2\", \"64 cm2\"]", "");
+  const auto narrow = bounds("narrow", "[\"58 cm2\", \"64 cm2\", \"70 cm2\"]", "");
+  ASSERT_EQ(whole.size(), 6u);
+  const double width = whole[1] - whole[0];
+  for (size_t i = 0; i < 6; ++i) {
+    EXPECT_NEAR(below[i], cut[i], 1e-4 * width) << i;
+    EXPECT_NEAR(joint[i], narrow[i], 1e-4 * width) << i;
+  }
+  EXPECT_LT(below[1], whole[1] - 0.1 * width);
+  EXPECT_GT(joint[0], whole[0] + 0.1 * width);
+}
+
 TEST(RccFuzzyCommand, EveryOriginalIsTheCurveOfItsInputs) {
   const OwnFolder own;
   const std::string inputs = own / "inputs.toml";

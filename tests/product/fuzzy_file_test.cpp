@@ -115,6 +115,15 @@ TEST(FuzzyFile, ComplainsAtThePlaceOfTheMistake) {
       {"section.bars.diameter = { triangular = [\"20 mm\", \"25 mm\", \"32 mm\"] }\n[search]\nsamples = 3", "E205",
        "samples", 3, 11},
       {"bridge.fc = 1", "E203", "bridge", 1, 1},
+      {"concrete.fc = { triangular = [\"10 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }\n[interaction]\nconstraints = "
+       "[\"fc <= 20\"]",
+       "E207", "the middle of the fuzzy inputs breaks this constraint", 3, 16},
+      {"concrete.fc = { triangular = [\"10 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }\n[interaction]\nmembership = "
+       "\"0.5 + fc / 100\"",
+       "E207", "0.75 in the middle of the fuzzy inputs; 1 is wanted", 3, 14},
+      {"concrete.fc = { triangular = [\"10 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }\n[interaction]\nconstraints = "
+       "[\"fc >= fy\"]",
+       "E208", "no value \"fy\"", 3, 23},
   };
   for (const Mistake& m : mistakes) {
     try {
@@ -132,6 +141,32 @@ TEST(FuzzyFile, ComplainsAtThePlaceOfTheMistake) {
       EXPECT_TRUE(found) << m.text << ":\n" << all;
     }
   }
+}
+
+TEST(FuzzyFile, InteractionSeesInputsAndWhatFollowsInTheirUnits) {
+  const FuzzyFile f = read(
+      "steel.fy = { triangular = [\"380 N/mm2\", \"420 N/mm2\", \"460 N/mm2\"] }\n"
+      "section.steel_area = { triangular = [\"50 cm2\", \"64 cm2\", \"80 cm2\"] }\n"
+      "steel.fu = { formula = \"1.2 * fy\" }\n"
+      "[interaction]\nconstraints = [\"steel_area <= 6400 + 10 * (460 - fy)\", \"fu >= 480\"]\n"
+      "membership = \"max(0, 1 - abs(fy - 420) / 30)\"\n");
+  const std::vector<double> seen = calc_interacting(f, std::vector{400e6, 70e-4});
+  ASSERT_EQ(seen.size(), 3u);
+  EXPECT_NEAR(seen[0], 400, 1e-9);
+  EXPECT_NEAR(seen[1], 7000, 1e-9);
+  EXPECT_NEAR(seen[2], 480, 1e-9);
+  EXPECT_TRUE(is_possible(f.interaction, seen)) << "6400 + 600 mm2, to round-off";
+  EXPECT_NEAR(calc_joint(f.interaction, seen), 1.0 / 3, 1e-12);
+  EXPECT_FALSE(is_possible(f.interaction, calc_interacting(f, std::vector{400e6, 71e-4})));
+  EXPECT_FALSE(is_possible(f.interaction, calc_interacting(f, std::vector{399e6, 64e-4}))) << "fu = 478.8";
+}
+
+TEST(FuzzyFile, EndsThatTheInteractionRulesOutNeedNotBeSections) {
+  const std::string values =
+      "concrete.fc = { triangular = [\"5 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }\n"
+      "concrete.fct = { formula = \"1.4 * ((fc - 8)/10)^(2/3)\" }\n";
+  EXPECT_THROW(read(values), InputError);
+  EXPECT_EQ(read(values + "[interaction]\nconstraints = [\"fc >= 9\"]\n").inputs.size(), 1u);
 }
 
 TEST(FuzzyFile, WarnsOfCornersThatAreNoSection) {
