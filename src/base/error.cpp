@@ -92,19 +92,22 @@ std::string render(const Diagnostic& d, const std::string& text, bool colour) {
 
 std::string nearest_name(const std::string& word, const std::vector<std::string>& known) {
   std::string best;
-  size_t best_distance = std::max<size_t>(1, word.size() / 3) + 1;
+  const auto small = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
+  const auto cost = [&](char a, char b) -> size_t { return a == b ? 0 : small(a) == small(b) ? 1 : 2; };
+  // in halves
+  size_t best_distance = 2 * std::max<size_t>(1, word.size() / 3) + 1;
   for (const auto& name : known) {
-    if (name.size() > word.size() + best_distance || word.size() > name.size() + best_distance) continue;
+    if (name.size() > word.size() + best_distance / 2 || word.size() > name.size() + best_distance / 2) continue;
     // optimal string alignment: a swap of neighbours counts once
     const size_t n = word.size(), m = name.size();
     std::vector<std::vector<size_t>> d(n + 1, std::vector<size_t>(m + 1));
-    for (size_t i = 0; i <= n; ++i) d[i][0] = i;
-    for (size_t j = 0; j <= m; ++j) d[0][j] = j;
+    for (size_t i = 0; i <= n; ++i) d[i][0] = 2 * i;
+    for (size_t j = 0; j <= m; ++j) d[0][j] = 2 * j;
     for (size_t i = 1; i <= n; ++i)
       for (size_t j = 1; j <= m; ++j) {
-        d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (word[i - 1] != name[j - 1])});
+        d[i][j] = std::min({d[i - 1][j] + 2, d[i][j - 1] + 2, d[i - 1][j - 1] + cost(word[i - 1], name[j - 1])});
         if (i > 1 && j > 1 && word[i - 1] == name[j - 2] && word[i - 2] == name[j - 1])
-          d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+          d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 2);
       }
     if (d[n][m] < best_distance) {
       best_distance = d[n][m];

@@ -44,7 +44,8 @@ class InputError : public std::runtime_error {
 /// `text` is the whole file; an empty one leaves the line out.
 std::string render(const Diagnostic&, const std::string& text, bool colour);
 
-/// The name in `known` nearest to `word` (edit distance at most a third of its length), or an empty string.
+/// The name in `known` nearest to `word` (edit distance at most a third of its length, a capital for a small letter
+/// counts half), or an empty string.
 std::string nearest_name(const std::string& word, const std::vector<std::string>& known);
 
 }  // namespace topple

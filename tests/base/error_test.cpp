@@ -123,6 +123,8 @@ TEST(NearestName, GivesNothingWhenNothingIsNear) {
 TEST(NearestName, TakesTheNearestThenTheFirst) {
   EXPECT_EQ(nearest_name("C-A1-0", {"C-B2-0", "C-A2-0", "C-A1-1"}), "C-A2-0");
   EXPECT_EQ(nearest_name("column", {"colunm_", "columns"}), "columns");
+  EXPECT_EQ(nearest_name("V_WB", {"X_WB", "v_WB", "w_WB"}), "v_WB") << "a capital for a small letter";
+  EXPECT_EQ(nearest_name("FC", {"fct", "fc"}), "fc");
 }
 
 TEST(NearestName, IsQuickOnHugeWords) { EXPECT_EQ(nearest_name(std::string(1000000, 'a'), {"section", "storey"}), ""); }
