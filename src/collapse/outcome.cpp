@@ -193,11 +193,13 @@ double rounding_of(const PlacedBox& box) {
   return std::max(1e-5, 0x1p-22 * std::max(std::abs(box.X_WS.p.x), std::abs(box.X_WS.p.y)));
 }
 
-/// Whether a box seen from above overlaps an area by no more than so much [m].
-bool only_touches(const PlacedBox& box, const Polygon& area, double least) {
+/// Of what of a box is farther than `least` over an area seen from above, the lowest height, to that much; infinite:
+/// nothing is [m].
+double calc_lowest_within(const PlacedBox& box, const Polygon& area, double least) {
   PlacedBox within = box;
   for (int i = 0; i < 3; ++i) within.half[i] = std::max(0.0, box.half[i] - least);
-  return calc_distance(calc_outline(within), area) > 0;
+  if (calc_distance(calc_outline(within), area) > 0) return std::numeric_limits<double>::infinity();
+  return calc_lowest_over(within, area) - least;
 }
 
 }  // namespace
@@ -236,8 +238,8 @@ Approach find_approach(const record::Record& r, const Polygon& area, const std::
         // as a wall beside it whose joint closes, or at the start the stave of a ring beside it
         constexpr double joint = 0.01;  // [m]
         const double may_overlap = f == 0 ? std::max(joint, calc_stave_error(r.bodies[b])) : joint;
-        if (d > 0 || only_touches(box, area, may_overlap)) continue;
-        const double height = calc_lowest_over(box, area);
+        if (d > 0) continue;
+        const double height = calc_lowest_within(box, area, may_overlap);
         if (height < out.lowest) out.lowest = height, out.lowest_when = r.time[f], out.lowest_body = b;
       }
     }

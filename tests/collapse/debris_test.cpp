@@ -125,6 +125,20 @@ TEST(Approach, WhatOnlyTouchesIsNotOverIt) {
   }
 }
 
+TEST(Approach, WhatLeansOverFromItsFootLandsOnNothing) {
+  record::Record r = make_three();
+  r.bodies.resize(1);
+  r.time.clear(), r.position.clear(), r.orientation.clear();
+  add_frame(r, {{2, 2, 0}});
+  // its side leans by 2 cm a metre and lies 2 mm over the area at the ground, 4.2 cm at its head
+  const Quat lean = exp_rotation({0, 0.02, 0});
+  r.orientation = {static_cast<float>(lean.w), static_cast<float>(lean.x), static_cast<float>(lean.y),
+                   static_cast<float>(lean.z)};
+  const Approach a = find_approach(r, {{2.478, 0}, {8, 0}, {8, 4}, {2.478, 4}});
+  EXPECT_EQ(a.least, 0);
+  EXPECT_NEAR(a.lowest, 0.4, 0.02) << "where it is 1 cm over";
+}
+
 TEST(DebrisTables, HoldEverySquareAndEveryCorner) {
   const std::string heights = make_height_table(make_three(), 0.5);
   // three boxes of 1 m x 1 m, each over four squares, 2 m high
