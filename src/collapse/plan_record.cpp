@@ -199,6 +199,7 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
 
 void fill_building(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, record::Record& r) {
   r.building_outline = calc_building_outline(model, map);
+  r.fall_azimuth = std::atan2(map.fall_direction.y, map.fall_direction.x);
   for (const product::Neighbour& n : plan.neighbours) r.neighbours.push_back({n.name, n.footprint, n.is_utility});
 }
 

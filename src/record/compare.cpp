@@ -8,11 +8,13 @@
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "base/error.h"
 #include "base/rotation_fit.h"
 #include "base/unit.h"
 #include "record/csv_text.h"
+#include "record/told.h"
 
 namespace topple::record {
 
@@ -37,12 +39,10 @@ Place find_place(const std::vector<double>& time, double at) {
   return {high - 1, high, (at - time[high - 1]) / (time[high] - time[high - 1])};
 }
 
-Vec3 position_at(const Record& r, const Place& place, size_t body) {
-  const auto one = [&](size_t frame) {
-    const float* p = &r.position[3 * (frame * r.bodies.size() + body)];
-    return Vec3{p[0], p[1], p[2]};
-  };
-  return (1 - place.share) * one(place.low) + place.share * one(place.high);
+/// Of a point of a body, its origin if none is given [m].
+Vec3 position_at(const Record& r, const Place& place, size_t body, const Vec3& p_B = {}) {
+  const auto one = [&](size_t frame) { return pose_at(r, frame, body) * p_B; };
+  return place.share == 0 ? one(place.low) : (1 - place.share) * one(place.low) + place.share * one(place.high);
 }
 
 double value_at(const std::vector<double>& values, const Place& place) {
@@ -70,13 +70,19 @@ double value_of(const Record& r, const std::string& id) {
   return kNone;
 }
 
-/// Angle from the vertical of what turned as bodies have moved since the first frame, by least squares [rad].
-double calc_lean(const Record& r, const Place& place, const std::vector<size_t>& bodies) {
+/// The axis, upright at first, of what turned as bodies have moved since the first frame, by least squares.
+Vec3 find_axis(const Record& r, const Place& place, const std::vector<size_t>& bodies) {
   std::vector<FitPoint> points;
   for (const size_t b : bodies) points.push_back({r.bodies[b].mass, position_at(r, {}, b), position_at(r, place, b)});
-  const Vec3 up = to_matrix(fit_points(points).rotation) * Vec3{0, 0, 1};
-  return std::atan2(std::hypot(up.x, up.y), up.z);
+  return to_matrix(fit_points(points).rotation) * Vec3{0, 0, 1};
 }
+
+double calc_lean(const Vec3& axis) { return std::atan2(std::hypot(axis.x, axis.y), axis.z); }
+
+/// Azimuth of an axis that leans by more than round-off [rad]; NaN: of none.
+double calc_lean_azimuth(const Vec3& axis) { return calc_lean(axis) > 1e-5 ? std::atan2(axis.y, axis.x) : kNone; }
+
+bool is_tilt(const Series& s) { return s.group == "angle" && s.id.rfind("tilt_angle", 0) == 0; }
 
 const SeriesPair* find_series(const Comparison& c, const std::string& id) {
   for (const SeriesPair& s : c.series)
@@ -162,7 +168,11 @@ Comparison compare(const Record& a, const Record& b, const std::string& path_a, 
   std::vector<Place> in_a, in_b;
   for (const double t : c.time) in_a.push_back(find_place(a.time, t)), in_b.push_back(find_place(b.time, t));
 
+  c.fall_azimuth_a = a.fall_azimuth, c.fall_azimuth_b = b.fall_azimuth;
+  constexpr double kSameAzimuth = 1e-6;
+  c.are_tilts_alike = !(std::abs(std::remainder(a.fall_azimuth - b.fall_azimuth, 2 * std::numbers::pi)) > kSameAzimuth);
   for (const Series& s : a.series) {
+    if (is_tilt(s) && !c.are_tilts_alike) continue;
     const auto other = std::find_if(b.series.begin(), b.series.end(), [&](const Series& x) { return x.id == s.id; });
     if (other == b.series.end() || other->unit != s.unit) continue;
     SeriesPair pair{s.id, s.title, s.unit, s.group, {}, {}};
@@ -193,13 +203,27 @@ Comparison compare(const Record& a, const Record& b, const std::string& path_a, 
                  ? "The records have no body in common; only the mass centres of all that moves are compared."
                  : fmt::format(
                        "{} of {} moving bodies of A, with {:.0f} % of its mass, have the same name in B ({} "
-                       "bodies); their frames' origins are compared, weighed by mass.",
+                       "bodies); where their frames' origins in A lie at first is compared, weighed by mass.",
                        matched.size(), moving, mass > 0 ? 100 * matched_mass / mass : 0.0, names.size());
+  // a charge, or another load, gives a body another mass centre in the same place
+  std::vector<Vec3> in_b_body;
+  double offset = 0;
+  for (const auto& [in_first, in_second] : matched) {
+    const Vec3 origin = position_at(a, {}, in_first);
+    in_b_body.push_back(inverse(pose_at(b, 0, in_second)) * origin);
+    offset = std::max(offset, norm(origin - position_at(b, {}, in_second)));
+  }
+  constexpr double kSamePlace = 1e-3;  // [m]
+  if (offset > kSamePlace)
+    c.points += fmt::format(
+        " In the first frames their origins lie up to {:.2f} m apart: see that the bodies stand in the same places.",
+        offset);
   for (size_t i = 0; i < c.time.size(); ++i) {
     double squares = 0, largest = matched.empty() ? kNone : 0;
     int farthest = -1;
-    for (const auto& [in_first, in_second] : matched) {
-      const double d = norm(position_at(a, in_a[i], in_first) - position_at(b, in_b[i], in_second));
+    for (size_t m = 0; m < matched.size(); ++m) {
+      const auto [in_first, in_second] = matched[m];
+      const double d = norm(position_at(a, in_a[i], in_first) - position_at(b, in_b[i], in_second, in_b_body[m]));
       squares += a.bodies[in_first].mass * d * d;
       if (d > largest) largest = d, farthest = static_cast<int>(in_first);
     }
@@ -209,13 +233,18 @@ Comparison compare(const Record& a, const Record& b, const std::string& path_a, 
     c.centre.push_back(norm(calc_centre(a, in_a[i]) - calc_centre(b, in_b[i])));
   }
 
+  c.lean_azimuth_a = c.lean_azimuth_b = kNone;
   constexpr size_t enough = 3;  // fewer lie on a line
   if (matched.size() >= enough) {
     std::vector<size_t> of_a, of_b;
     for (const auto& [in_first, in_second] : matched) of_a.push_back(in_first), of_b.push_back(in_second);
     SeriesPair lean{kLean, "Lean of all bodies compared", "rad", "angle", {}, {}};
-    for (size_t i = 0; i < c.time.size(); ++i)
-      lean.a.push_back(calc_lean(a, in_a[i], of_a)), lean.b.push_back(calc_lean(b, in_b[i], of_b));
+    for (size_t i = 0; i < c.time.size(); ++i) {
+      const Vec3 axis_a = find_axis(a, in_a[i], of_a), axis_b = find_axis(b, in_b[i], of_b);
+      lean.a.push_back(calc_lean(axis_a)), lean.b.push_back(calc_lean(axis_b));
+      c.lean_apart.push_back(std::atan2(norm(cross(axis_a, axis_b)), dot(axis_a, axis_b)));
+      c.lean_azimuth_a = calc_lean_azimuth(axis_a), c.lean_azimuth_b = calc_lean_azimuth(axis_b);
+    }
     c.series.push_back(std::move(lean));
   }
 
@@ -270,12 +299,28 @@ std::vector<std::string> summarise(const Comparison& c) {
                         std::isfinite(c.tilt_share)
                             ? fmt::format(", {:.0f} % of the larger tilt at the end of this time", 100 * c.tilt_share)
                             : std::string())
+      : !c.are_tilts_alike
+          ? fmt::format("Tilt: A counts it towards {}, B towards {}, so it is not compared; see how they lean.",
+                        tell_azimuth(c.fall_azimuth_a, count_digits_of_angle(c.fall_azimuth_a)),
+                        tell_azimuth(c.fall_azimuth_b, count_digits_of_angle(c.fall_azimuth_b)))
           : fmt::format("Tilt up to {:.2f} s: not known of both.", c.until),
       fmt::format("Mass centres up to then: at most {:.2f} m apart.", c.centre_difference)};
   // the tilt of a record is that of what hangs together there
-  if (const SeriesPair* lean = find_series(c, kLean))
-    out.push_back(fmt::format("At {:.2f} s all bodies compared lean by {:.2f} deg in A, {:.2f} deg in B.",
-                              c.time.back(), lean->a.back() / unit::deg, lean->b.back() / unit::deg));
+  if (const SeriesPair* lean = find_series(c, kLean)) {
+    const auto towards = [](double azimuth) {
+      return std::isfinite(azimuth) ? " towards " + tell_azimuth(azimuth) : std::string();
+    };
+    out.push_back(
+        fmt::format("At {:.2f} s all bodies compared lean by {:.2f} deg{} in A, {:.2f} deg{} in B: {:.2f} deg apart.",
+                    c.time.back(), lean->a.back() / unit::deg, towards(c.lean_azimuth_a), lean->b.back() / unit::deg,
+                    towards(c.lean_azimuth_b), c.lean_apart.back() / unit::deg));
+    const auto until = static_cast<size_t>(std::upper_bound(c.time.begin(), c.time.end(), c.until) - c.time.begin());
+    if (until > 0)
+      out.back() += fmt::format(
+          " Up to {:.2f} s they lean by at most {:.2f} deg apart.", c.until,
+          *std::max_element(c.lean_apart.begin(), c.lean_apart.begin() + static_cast<std::ptrdiff_t>(until)) /
+              unit::deg);
+  }
   return out;
 }
 
@@ -292,7 +337,11 @@ std::string describe(const Comparison& c, const Record& a, const Record& b) {
   const SeriesPair *tilt = find_series(c, "tilt_angle"), *force = find_series(c, "ground_force"),
                    *kinetic = find_series(c, "energy_kinetic");
   line("");
-  line("  time     tilt A   tilt B  kinetic A  kinetic B  ground A  ground B  apart (rms)  largest");
+  // towards different sides tilts are no pair, leans are
+  const bool has_leans = !c.are_tilts_alike;
+  if (has_leans) tilt = find_series(c, kLean);
+  line(std::string("  time     ") + (has_leans ? "lean A   lean B" : "tilt A   tilt B") +
+       "  kinetic A  kinetic B  ground A  ground B  apart (rms)  largest");
   line("     s        deg      deg         MJ         MJ        MN        MN            m        m");
   const auto at = [](const SeriesPair* s, bool first, size_t i, double scale) {
     return s ? (first ? s->a[i] : s->b[i]) / scale : kNone;
@@ -300,9 +349,9 @@ std::string describe(const Comparison& c, const Record& a, const Record& b) {
   const SeriesPair* share = find_series(c, "connected_share");
   const size_t end_a = share ? find_break_up(share->a) : c.time.size(), end_b = share ? find_break_up(share->b) : end_a;
   // tilt of an upper block beside that of all bodies says nothing
-  if (c.knows_touchdown_a != c.knows_touchdown_b) tilt = nullptr;
+  if (!has_leans && c.knows_touchdown_a != c.knows_touchdown_b) tilt = nullptr;
   const auto tilt_at = [&](bool first, size_t i) {
-    return i < (first ? end_a : end_b) ? at(tilt, first, i, unit::deg) : kNone;
+    return has_leans || i < (first ? end_a : end_b) ? at(tilt, first, i, unit::deg) : kNone;
   };
   const size_t rows = std::min<size_t>(12, c.time.size());
   for (size_t k = 0; k < rows; ++k) {
@@ -314,7 +363,7 @@ std::string describe(const Comparison& c, const Record& a, const Record& b) {
   }
   std::string ends;
   for (const auto& [name, end] : {std::pair{"A", end_a}, {"B", end_b}})
-    if (tilt && end < c.time.size())
+    if (tilt && !has_leans && end < c.time.size())
       ends += fmt::format("{}{} ends at {:.2f} s", ends.empty() ? "" : ", ", name, c.time[end]);
   if (!ends.empty()) line(fmt::format("Tilt: {}, when less than half of the upper block holds together.", ends));
   if (!c.touchdowns.empty()) line(fmt::format("\nTouchdowns, the first of {}:", c.touchdowns.size()));
@@ -328,14 +377,14 @@ std::string to_csv(const Comparison& c, const Record& a) {
   std::string out = "time [s]";
   for (const SeriesPair& s : c.series)
     for (const char* of : {"A", "B", "B - A"}) out += "," + quote_csv(fmt::format("{} {} [{}]", s.id, of, s.unit));
-  out += ",distance rms [m],distance largest [m],farthest,distance of mass centres [m]\r\n";
+  out += ",distance rms [m],distance largest [m],farthest,distance of mass centres [m],leans apart [rad]\r\n";
   const auto field = [](double v) { return std::isfinite(v) ? fmt::format(",{}", v + 0.0) : std::string(","); };
   for (size_t i = 0; i < c.time.size(); ++i) {
     out += fmt::format("{}", c.time[i]);
     for (const SeriesPair& s : c.series) out += field(s.a[i]) + field(s.b[i]) + field(s.b[i] - s.a[i]);
     out += field(c.rms[i]) + field(c.largest[i]);
     out += "," + (c.farthest[i] < 0 ? std::string() : quote_csv(a.bodies[static_cast<size_t>(c.farthest[i])].name));
-    out += field(c.centre[i]) + "\r\n";
+    out += field(c.centre[i]) + field(c.lean_apart.empty() ? kNone : c.lean_apart[i]) + "\r\n";
   }
   return out;
 }
@@ -356,6 +405,8 @@ std::string to_json(const Comparison& c, const Record& a) {
   j["tilt_time"] = number(c.tilt_time);
   j["tilt_share"] = number(c.tilt_share);
   j["centre_difference"] = number(c.centre_difference);
+  j["fall_azimuth"] = {number(c.fall_azimuth_a), number(c.fall_azimuth_b)};
+  j["lean_azimuth"] = {number(c.lean_azimuth_a), number(c.lean_azimuth_b)};
   j["time"] = numbers(c.time);
   j["series"] = json::array();
   for (const SeriesPair& s : c.series)
@@ -371,7 +422,8 @@ std::string to_json(const Comparison& c, const Record& a) {
   j["distance"] = {{"rms", numbers(c.rms)},
                    {"largest", numbers(c.largest)},
                    {"farthest", std::move(farthest)},
-                   {"centre", numbers(c.centre)}};
+                   {"centre", numbers(c.centre)},
+                   {"lean", c.lean_apart.empty() ? json(nullptr) : numbers(c.lean_apart)}};
   j["touchdowns"] = json::array();
   for (const TouchdownPair& t : c.touchdowns)
     j["touchdowns"].push_back({{"body", t.body}, {"a", number(t.a)}, {"b", number(t.b)}});

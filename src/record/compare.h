@@ -27,7 +27,8 @@ struct Comparison {
   std::string title_a, title_b;
   std::string note;          // a sentence: that they are told apart by their titles; empty: they are not
   std::vector<double> time;  // frames of A within the time that both have [s]       (T)
-  // with three bodies in common also "lean_compared", the angle from the vertical of all of them by least squares
+  // with three bodies in common also "lean_compared", the angle from the vertical of all of them by least squares; none
+  // of tilts where the records count them towards different azimuths
   std::vector<SeriesPair> series;
   std::string points;                     // a sentence: what was compared by position
   int matched = 0;                        // bodies of the same name in both
@@ -41,10 +42,15 @@ struct Comparison {
   bool knows_touchdown_a = true, knows_touchdown_b = true;  // records of models know no upper block
   double end_a = 0, end_b = 0;                              // of the records [s]
   double until = 0;                                         // [s]
+  bool are_tilts_alike = true;                              // counted towards one azimuth, as far as is known
+  double fall_azimuth_a = 0, fall_azimuth_b = 0;            // towards which they count; NaN: not known [rad]
   double tilt_difference = 0;                               // largest |a - b| [rad]; NaN: not known of both
   double tilt_time = 0;                                     // when [s]; NaN likewise
   double tilt_share = 0;         // over the larger of both tilts at `until`; NaN: nothing tilts
   double centre_difference = 0;  // largest distance of mass centres [m]
+  // angle between both axes of "lean_compared" [rad] (T), and the azimuths of both at the end [rad]; NaN: none
+  std::vector<double> lean_apart;
+  double lean_azimuth_a = 0, lean_azimuth_b = 0;
 };
 
 /// Of two paths the last parts that differ, without extension: "left", "right" of left/record.h5 and right/record.h5.

@@ -600,6 +600,9 @@ void transfer(Archive& a, Record& r, Flat& flat) {
   a.column("neighbour_corners/position", flat.corners, &CornerRow::value, {.unit = "m", .frame = "world"});
   a.first_column("building_outline", r.building_outline, std::identity{},
                  {.unit = "m", .frame = "world", .meaning = "counter-clockwise"});
+  if (a.has("fall_azimuth"))  // not in records of earlier versions
+    a.scalar("fall_azimuth", r.fall_azimuth,
+             {.unit = "rad", .meaning = "towards which tilts count positive, from +x counter-clockwise; NaN: none"});
 
   a.first_column("frames/time", r.time, std::identity{}, {.unit = "s"});
   const hsize_t frames = r.time.size(), bodies = r.bodies.size(), zones = r.zones.size();

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -127,6 +128,8 @@ struct Record {
   std::vector<CrushedEnd> crushed_ends;  // in rising order
   std::vector<Neighbour> neighbours;
   std::vector<std::array<double, 2>> building_outline;  // before the first charge, counter-clockwise [m]
+  // towards which tilts count positive, from +x counter-clockwise; NaN: not known [rad]
+  double fall_azimuth = std::numeric_limits<double>::quiet_NaN();
 
   std::vector<double> time;              // strictly rising [s]              (S)
   std::vector<float> position;           // p_WB of the frame of each body [m] (S x B x 3)

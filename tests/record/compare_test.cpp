@@ -50,17 +50,52 @@ TEST(Compare, FindsTheDistanceOfTheSameBodiesAtTheSameInstants) {
   ASSERT_EQ(c.time.size(), 9u);
   EXPECT_EQ(c.matched, 2);
   for (size_t i = 0; i < c.time.size(); ++i) {
-    // both bodies are apart by what the speeds and the offset make
-    EXPECT_NEAR(c.rms[i], 0.5 + 2 * c.time[i], 8 * kSingle);
-    EXPECT_NEAR(c.largest[i], 0.5 + 2 * c.time[i], 8 * kSingle);
+    // both bodies are apart by what the speeds make; where they began is told
+    EXPECT_NEAR(c.rms[i], 2 * c.time[i], 8 * kSingle);
+    EXPECT_NEAR(c.largest[i], 2 * c.time[i], 8 * kSingle);
     EXPECT_NEAR(c.centre[i], 0.5 + 2 * c.time[i], 8 * kSingle);
   }
+  EXPECT_THAT(c.points, HasSubstr("In the first frames their origins lie up to 0.50 m apart"));
+}
+
+TEST(Compare, FollowsAPointOfBodiesWhoseMassCentresDiffer) {
+  // the same body, its origin 0.4 m higher in B, turns by 0.1 rad a frame about the foot of A's
+  Record a = make_run("a", 0.25, 3, 0, 0, 1), b = make_run("b", 0.25, 3, 0, 0, 1);
+  for (size_t s = 0; s < 3; ++s) {
+    const double angle = 0.1 * static_cast<double>(s);
+    for (auto& [r, lever] : {std::pair{&a, 0.0}, std::pair{&b, 0.4}}) {
+      r->position[6 * s] = static_cast<float>(lever * std::sin(angle));
+      r->position[6 * s + 2] = static_cast<float>(3 + lever * std::cos(angle));
+      r->orientation[8 * s] = static_cast<float>(std::cos(angle / 2));
+      r->orientation[8 * s + 2] = static_cast<float>(std::sin(angle / 2));
+    }
+  }
+  const Comparison c = compare(a, b);
+  for (size_t i = 0; i < 3; ++i) EXPECT_NEAR(c.largest[i], 0, 4 * kSingle) << i;
+  EXPECT_THAT(c.points, HasSubstr("up to 0.40 m apart"));
+}
+
+TEST(Compare, TiltsTowardsDifferentSidesAreNotCompared) {
+  Record a = make_run("a", 0.25, 5, 0, 0, 1), b = make_run("b", 0.25, 5, 0, 0, 1);
+  a.findings = b.findings = {{"touchdown.first", "", "", "", 0.8, "s"}};
+  a.fall_azimuth = 3.141592653589793, b.fall_azimuth = -3.141592653589793;
+  EXPECT_EQ(compare(a, b).tilt_difference, 0) << "one azimuth";
+  b.fall_azimuth = 0;
+  const Comparison c = compare(a, b);
+  EXPECT_TRUE(std::isnan(c.tilt_difference));
+  EXPECT_TRUE(std::none_of(c.series.begin(), c.series.end(), [](const SeriesPair& s) { return s.id == "tilt_angle"; }));
+  EXPECT_THAT(describe(c, a, b),
+              HasSubstr("Tilt: A counts it towards 180 deg, B towards 0 deg, so it is not compared"));
+  const auto j = nlohmann::json::parse(to_json(c, a));
+  EXPECT_NEAR(j["fall_azimuth"][0].get<double>(), 3.14159, 1e-5);
+  a.fall_azimuth = std::nan("");
+  EXPECT_EQ(compare(a, b).tilt_difference, 0) << "of a record that does not know";
 }
 
 TEST(Compare, WeighsByMass) {
   Record a = make_run("a", 0.25, 3, 0, 0, 1), b = a;
   b.provenance.engine = "b";
-  for (size_t s = 0; s < 3; ++s) b.position[6 * s + 1] += 2;  // the light body, to the side
+  for (size_t s = 1; s < 3; ++s) b.position[6 * s + 1] += 2;  // the light body, to the side
   const Comparison c = compare(a, b);
   EXPECT_NEAR(c.rms[1], std::sqrt(1.0 / 4 * 4), kSingle);
   EXPECT_NEAR(c.largest[1], 2, kSingle);
@@ -144,8 +179,12 @@ TEST(Compare, FindsTheLeanOfAllBodiesOfBoth) {
   for (size_t i = 0; i < c.time.size(); ++i) {
     EXPECT_NEAR(lean.a[i], 0.2 * c.time[i], 4 * kSingle);
     EXPECT_NEAR(lean.b[i], 0.1 * c.time[i], 4 * kSingle);
+    // of two axes at right angles to each other in plan
+    EXPECT_NEAR(std::cos(c.lean_apart[i]), std::cos(0.2 * c.time[i]) * std::cos(0.1 * c.time[i]), 4 * kSingle);
   }
-  EXPECT_THAT(describe(c, a, b), HasSubstr("At 1.00 s all bodies compared lean by 11.46 deg in A, 5.73 deg in B."));
+  EXPECT_THAT(describe(c, a, b),
+              HasSubstr("At 1.00 s all bodies compared lean by 11.46 deg towards 0 deg in A, 5.73 deg towards "
+                        "270 deg in B: 12.79 deg apart."));
 }
 
 TEST(Compare, PairsTouchdownsByBody) {
@@ -171,21 +210,21 @@ TEST(Compare, OfUnlikeBodiesKeepsToMassCentresAndSaysSo) {
 }
 
 TEST(Compare, QuotesNamesInItsTable) {
-  Record a = make_run("a", 0.25, 3, 1, 0, 1), b = make_run("b", 0.25, 3, 1, 0.5, 1);
+  Record a = make_run("a", 0.25, 3, 1, 0, 1), b = make_run("b", 0.25, 3, 3, 0, 1);
   for (Record* r : {&a, &b}) r->bodies[0].name = "C, \"1\"";
-  EXPECT_THAT(to_csv(compare(a, b), a), HasSubstr(",\"C, \"\"1\"\"\",0.5\r\n"));
+  EXPECT_THAT(to_csv(compare(a, b), a), HasSubstr(",\"C, \"\"1\"\"\",0.5,\r\n"));
 }
 
 TEST(Compare, WritesTablesThatHoldTheNumbers) {
   const Record a = make_run("a", 0.25, 3, 1, 0, 1);
-  Record b = make_run("a", 0.25, 3, 1, 0.5, 1);
+  Record b = make_run("a", 0.25, 3, 3, 0, 1);
   b.series.pop_back();
   const Comparison c = compare(a, b);
   EXPECT_EQ(c.name_a, "a (first)");
   const std::string csv = to_csv(c, a);
   EXPECT_THAT(csv,
               testing::StartsWith("time [s],tilt_angle A [rad],tilt_angle B [rad],tilt_angle B - A [rad],distance"));
-  EXPECT_THAT(csv, HasSubstr("\r\n0.25,0.025,0.025,0,0.5,0.5,C-A1-0,0.5\r\n"));
+  EXPECT_THAT(csv, HasSubstr("\r\n0.25,0.025,0.025,0,0.5,0.5,C-A1-0,0.5,\r\n"));
   const auto j = nlohmann::json::parse(to_json(c, a));
   EXPECT_EQ(j["format"], "topple-comparison");
   EXPECT_EQ(j["series"][0]["b"][2], 0.05);
@@ -226,7 +265,7 @@ TEST(Compare, SaysThatTitlesDifferWhereItIsRead) {
 TEST(Compare, WritesNoMinusZero) {
   Record a = make_run("a", 0.25, 3, 1, 0, 1), b = make_run("b", 0.25, 3, 1, 0, 1);
   a.series[0].value[0] = b.series[0].value[0] = -0.0;
-  EXPECT_THAT(to_csv(compare(a, b), a), HasSubstr("\r\n0,0,0,0,0,0,,0\r\n"));
+  EXPECT_THAT(to_csv(compare(a, b), a), HasSubstr("\r\n0,0,0,0,0,0,,0,\r\n"));
 }
 
 TEST(Compare, TellsNoTiltOfABlockBesideThatOfAllBodies) {

@@ -147,13 +147,30 @@ function Photos(props: { state: State; photos: Photo[] }) {
 const degrees = (angle: number | null): string => (angle === null ? "–" : `${((angle * 180) / Math.PI).toFixed(2)}°`);
 const instant = (t: number | null, end?: number | null): string => (t !== null ? formatTime(t) : end === undefined || end === null ? "never" : `not up to ${formatTime(end)}`);
 
+const azimuth = (angle: number): string => `${(Math.round((angle * 180) / Math.PI) + 360) % 360}°`;
+
+/// How all bodies compared lean at the end, and how far apart they leant.
+function tellLean(c: Comparison): [string, string][] {
+  const lean = c.series.find((s) => s.id === "lean_compared");
+  const apart = c.distance.lean;
+  if (lean === undefined || !apart) return [];
+  const one = (values: (number | null)[], towards: number | null | undefined): string =>
+    `${degrees(values.at(-1) ?? null)}${towards === null || towards === undefined ? "" : ` towards ${azimuth(towards)}`}`;
+  const before = apart.filter((v, i) => v !== null && (c.time[i] ?? Infinity) <= (c.until ?? Infinity)) as number[];
+  const most = before.length > 0 ? `; until then at most ${degrees(Math.max(...before))}` : "";
+  return [["Lean at the end", `A ${one(lean.a, c.lean_azimuth?.[0])}, B ${one(lean.b, c.lean_azimuth?.[1])}: ${degrees(apart.at(-1) ?? null)} apart${most}`]];
+}
+
 function Summary(props: { comparison: Comparison }) {
   const { comparison: c } = props;
   const [a, b] = c.touchdown;
+  const [planA, planB] = c.fall_azimuth ?? [null, null];
+  const tiltsDiffer = planA !== null && planB !== null && !c.series.some((s) => s.id === "tilt_angle");
   const rows: [string, string][] = [
     ["First touchdown of the upper block", `A ${instant(a, c.end?.[0])}, B ${instant(b, c.end?.[1])}${a === null || b === null ? "" : `, difference ${(b - a).toFixed(3)} s`}`],
-    ["Largest difference of the tilt until then", c.tilt_difference === null ? "not known of both" : `${degrees(c.tilt_difference)} at ${formatTime(c.tilt_time ?? 0)}${c.tilt_share === null ? "" : `, ${(100 * c.tilt_share).toFixed(0)} % of the larger tilt at the end of this time`}`],
+    ["Largest difference of the tilt until then", c.tilt_difference === null ? (tiltsDiffer ? `not compared: A counts it towards ${azimuth(planA)}, B towards ${azimuth(planB)}` : "not known of both") : `${degrees(c.tilt_difference)} at ${formatTime(c.tilt_time ?? 0)}${c.tilt_share === null ? "" : `, ${(100 * c.tilt_share).toFixed(0)} % of the larger tilt at the end of this time`}`],
     ["Mass centres until then", c.centre_difference === null ? "–" : `at most ${c.centre_difference.toFixed(2)} m apart`],
+    ...tellLean(c),
     ["Compared", c.points],
   ];
   return (
@@ -183,8 +200,8 @@ function Touchdowns(props: { state: State; comparison: Comparison }) {
             {comparison.touchdowns.slice(0, 300).map((t) => (
               <tr onClick={() => state.pauseAt(Math.min(t.a ?? Infinity, t.b ?? Infinity))}>
                 <td>{t.body}</td>
-                <td>{t.a?.toFixed(2) ?? "never"}</td>
-                <td>{t.b?.toFixed(2) ?? "never"}</td>
+                <td>{t.a?.toFixed(2) ?? instant(null, comparison.end?.[0])}</td>
+                <td>{t.b?.toFixed(2) ?? instant(null, comparison.end?.[1])}</td>
                 <td>{t.a === null || t.b === null ? "" : (t.b - t.a).toFixed(2).replace(/^-(?=0\.00$)/, "")}</td>
               </tr>
             ))}

@@ -23,9 +23,11 @@ export interface Comparison {
   tilt_time: number | null;
   tilt_share: number | null;
   centre_difference: number | null; // [m]
+  fall_azimuth?: [number | null, number | null]; // towards which tilts count positive [rad]
+  lean_azimuth?: [number | null, number | null]; // of all bodies compared, at the end [rad]
   time: number[]; // (T)
   series: ComparedSeries[];
-  distance: { rms: (number | null)[]; largest: (number | null)[]; farthest: (string | null)[]; centre: (number | null)[] };
+  distance: { rms: (number | null)[]; largest: (number | null)[]; farthest: (string | null)[]; centre: (number | null)[]; lean?: (number | null)[] | null };
   touchdowns: { body: string; a: number | null; b: number | null }[];
 }
 export interface Photo {
