@@ -553,12 +553,14 @@ void add_vibration(const Context& c, const Mechanism& m) {
     return;
   }
   const product::VibrationLaw& law = *c.plan.vibration;
+  std::string source = law.source;
+  while (!source.empty() && (source.back() == '.' || source.back() == ' ')) source.pop_back();  // the sentence has one
   c.add("vibration", heading, "Screening, not a prediction",
         fmt::format("v = {:g} mm/s (E / {:g} MJ)^{:g} (r / {:g} m)^-{:g}, between 1/{:g} and {:g} times that, with E "
                     "the energy that moving parts lose within {:g} s, whatever takes it, so that it is an upper end; "
                     "source of these numbers: {}. What the ground really does is for measurements on site to show.",
                     law.velocity / unit::mm, law.energy * 1e-6, law.energy_exponent, law.distance,
-                    law.distance_exponent, law.factor, law.factor, law.window, law.source),
+                    law.distance_exponent, law.factor, law.factor, law.window, source),
         kNone, "");
   // what round-off makes of a building that stands is no energy
   const double least_energy = 1e-6 * c.map.moving_mass * norm(c.model.gravity);
@@ -780,8 +782,11 @@ void add_rigid_block(const Context& c) {
     rests &= !gains_speed(c, std::vector<bool>(c.map.structures.size(), true), before,
                           find_frame(c.recorder.block_frames(), block.release));
   if (!rests) {
+    const bool has_fired = c.r.time.back() >= block.release - 1e-9;
     c.add("rigid_block", "Mechanism", "Beside a rigid block",
-          "No comparison: the upper block was in motion before the last stage fired.", kNone, "rad");
+          has_fired ? "No comparison: the upper block was in motion before the last charge fired."
+                    : "No comparison: the run ended before the last charge fired.",
+          kNone, "rad");
     return;
   }
   if (block.mass * block.gravity * block.ahead <= block.plastic_moment) {
@@ -1096,6 +1101,38 @@ std::string tell_not_modelled(const std::vector<std::string>& list) {
   return text + ".";
 }
 
+namespace {
+
+/// How hard cables pull, by the frames.
+void add_cables(const Context& c) {
+  for (const mbs::Cable& cable : c.model.cables) {
+    const auto& all = c.r.series;
+    const auto pull =
+        std::find_if(all.begin(), all.end(), [&](const auto& s) { return s.id == "cable_" + cable.name; });
+    if (pull == all.end()) continue;
+    double first = kNone, most = 0, when = 0;
+    for (size_t i = 0; i < c.r.time.size(); ++i) {
+      if (!std::isfinite(pull->value[i])) continue;
+      if (std::isnan(first)) first = pull->value[i];
+      if (pull->value[i] > most) most = pull->value[i], when = c.r.time[i];
+    }
+    std::string text = "It is slack in all frames.";
+    if (most > 0) {
+      text = fmt::format("It pulls with {:.4g} kN at first and with {:.4g} kN at most, at {:.2f} s", first / unit::kN,
+                         most / unit::kN, when);
+      if (std::isfinite(cable.strength)) text += fmt::format(": {:.0f} % of its strength", 100 * most / cable.strength);
+      text += ".";
+    }
+    bool is_broken = false;
+    for (const record::Event& e : c.r.events)
+      if (e.kind == "cable" && e.subject == cable.name && !is_broken)
+        is_broken = true, text += fmt::format(" It breaks at {:.2f} s.", e.time);
+    c.add("cable." + cable.name, "Cables", cable.name, text, most, "N", is_broken ? Status::Warning : Status::Info);
+  }
+}
+
+}  // namespace
+
 bool add_findings(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
                   const Recorder& recorder, const mbs::Summary& summary, record::Record& r,
                   const std::atomic<bool>* cancel, const HeadsAcross* across) {
@@ -1129,6 +1166,7 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
   add_rigid_block(c);
   const Standing standing = add_stability(c);
   if (c.is_cancelled()) return false;
+  add_cables(c);
   const Reach reach = add_debris(c, m);
   add_clearances(c);
   if (c.is_cancelled()) return false;

@@ -96,6 +96,7 @@ Recorder::Recorder(const mbs::Model& model, const ModelMap& map, const Knowledge
                    {"energy_residual", "Error of the balance", "J", "energy", {}},
                    {"broken_zones", "Broken zones and joints", "1", "count", {}},
                    {"connected_share", "Connected share of the upper block", "1", "share", {}}};
+  for (const mbs::Cable& c : model.cables) record.series.push_back({"cable_" + c.name, c.name, "N", "cable", {}});
   if (!model.loads.empty()) record.series.push_back({"energy_loads", "Work of loads", "J", "energy", {}});
 }
 
@@ -438,7 +439,13 @@ void Recorder::append(const Recorder& from, size_t frames, double until) {
   take_crushed_ends(from, until);
   copy(record_.zone_state, r.zone_state, frames * Z);
   copy(record_.zone_utilisation, r.zone_utilisation, frames * Z);
-  for (size_t s = 0; s < record_.series.size(); ++s) copy(record_.series[s].value, r.series[s].value, frames);
+  for (record::Series& s : record_.series) {
+    const auto same = std::find_if(r.series.begin(), r.series.end(), [&](const auto& o) { return o.id == s.id; });
+    if (same != r.series.end())
+      copy(s.value, same->value, frames);
+    else  // a cable that came later
+      s.value.resize(s.value.size() + frames, std::numeric_limits<double>::quiet_NaN());
+  }
   for (size_t s = 0; s < block_.size(); ++s) copy(block_[s], from.block_[s], frames);
   copy(zone_frames_, from.zone_frames_, frames);
   copy(impulse_, from.impulse_, frames);
@@ -590,6 +597,7 @@ void Recorder::add_frame(const mbs::View& v) {
                            static_cast<double>(zf.broken),
                            block.connected};
   for (size_t i = 0; i < std::size(values); ++i) series(i).value.push_back(values[i]);
+  for (size_t i = 0; i < model_.cables.size(); ++i) series(std::size(values) + i).value.push_back(v.cable_force[i]);
   if (!model_.loads.empty()) record_.series.back().value.push_back(e.loads);
 }
 

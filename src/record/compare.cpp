@@ -307,19 +307,16 @@ std::vector<std::string> summarise(const Comparison& c) {
       fmt::format("Mass centres up to then: at most {:.2f} m apart.", c.centre_difference)};
   // the tilt of a record is that of what hangs together there
   if (const SeriesPair* lean = find_series(c, kLean)) {
-    const auto towards = [](double azimuth) {
-      return std::isfinite(azimuth) ? " towards " + tell_azimuth(azimuth) : std::string();
-    };
-    out.push_back(
-        fmt::format("At {:.2f} s all bodies compared lean by {:.2f} deg{} in A, {:.2f} deg{} in B: {:.2f} deg apart.",
-                    c.time.back(), lean->a.back() / unit::deg, towards(c.lean_azimuth_a), lean->b.back() / unit::deg,
-                    towards(c.lean_azimuth_b), c.lean_apart.back() / unit::deg));
-    const auto until = static_cast<size_t>(std::upper_bound(c.time.begin(), c.time.end(), c.until) - c.time.begin());
+    out.push_back(fmt::format(
+        "At {:.2f} s all bodies compared lean by {:.2f} deg in A, {:.2f} deg in B: {:.2f} deg apart.", c.time.back(),
+        lean->a.back() / unit::deg, lean->b.back() / unit::deg, c.lean_apart.back() / unit::deg));
+    if (std::isfinite(c.lean_azimuth_a) && std::isfinite(c.lean_azimuth_b))
+      out.push_back(fmt::format("They lean towards {} in A, {} in B.", tell_azimuth(c.lean_azimuth_a),
+                                tell_azimuth(c.lean_azimuth_b)));
+    const auto until = std::upper_bound(c.time.begin(), c.time.end(), c.until) - c.time.begin();
     if (until > 0)
-      out.back() += fmt::format(
-          " Up to {:.2f} s they lean by at most {:.2f} deg apart.", c.until,
-          *std::max_element(c.lean_apart.begin(), c.lean_apart.begin() + static_cast<std::ptrdiff_t>(until)) /
-              unit::deg);
+      out.push_back(fmt::format("Leans up to {:.2f} s: at most {:.2f} deg apart.", c.until,
+                                *std::max_element(c.lean_apart.begin(), c.lean_apart.begin() + until) / unit::deg));
   }
   return out;
 }

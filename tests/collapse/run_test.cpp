@@ -53,6 +53,31 @@ TEST(Run, ARecordIsWhole) {
   EXPECT_LT(r.provenance.step, 1e-3);
 }
 
+TEST(Run, TellsHowHardCablesPull) {
+  const auto run = [](const std::string& strength) {
+    const std::string cable =
+        "[[cable]]\nname = \"guy\"\nmember = \"C-B1-1\"\nposition = \"1 m\"\nanchor = [\"40 m\", "
+        "\"0 m\", \"0 m\"]\nstiffness = \"50 kN/m\"\npretension = \"5 kN\"\nstrength = \"" +
+        strength + "\"\n";
+    return run_plan(read(house(charge("C-A*-0", "0.1 s"), "1.5 s") + cable), default_knowledge(), {}, {});
+  };
+  const record::Record holds = run("1 MN"), breaks = run("20 kN");
+  const std::vector<double> pull = series(holds, "cable_guy");
+  ASSERT_EQ(pull.size(), holds.time.size());
+  EXPECT_NEAR(pull.front(), 5e3, 50) << "the building gives way by 1 mm at most";
+  const double most = *std::max_element(pull.begin(), pull.end());
+  EXPECT_GT(most, 20e3) << "it falls away from the anchor";
+  EXPECT_EQ(finding(holds, "cable.guy").value, most);
+  EXPECT_EQ(finding(holds, "cable.guy").status, record::Status::Info);
+  EXPECT_THAT(finding(holds, "cable.guy").text,
+              testing::HasSubstr(fmt::format("{:.0f} % of its strength", most / 1e4)));
+  const record::Finding& broken = finding(breaks, "cable.guy");
+  EXPECT_LT(broken.value, 20e3);
+  EXPECT_EQ(broken.status, record::Status::Warning);
+  EXPECT_THAT(broken.text, testing::HasSubstr(" It breaks at "));
+  EXPECT_EQ(series(breaks, "cable_guy").back(), 0);
+}
+
 TEST(Run, TellsThePlanAPrintNeeds) {
   const std::string stages = charge("C-A*-0", "0.1 s", "scatter = \"3 ms\"");
   const std::string more =

@@ -183,8 +183,8 @@ TEST(Compare, FindsTheLeanOfAllBodiesOfBoth) {
     EXPECT_NEAR(std::cos(c.lean_apart[i]), std::cos(0.2 * c.time[i]) * std::cos(0.1 * c.time[i]), 4 * kSingle);
   }
   EXPECT_THAT(describe(c, a, b),
-              HasSubstr("At 1.00 s all bodies compared lean by 11.46 deg towards 0 deg in A, 5.73 deg towards "
-                        "270 deg in B: 12.79 deg apart."));
+              HasSubstr("At 1.00 s all bodies compared lean by 11.46 deg in A, 5.73 deg in B: 12.79 deg apart.\nThey "
+                        "lean towards 0 deg in A, 270 deg in B.\nLeans up to 1.00 s: at most 12.79 deg apart."));
 }
 
 TEST(Compare, PairsTouchdownsByBody) {

@@ -125,6 +125,7 @@ const unitOfValue: Record<string, Readable> = {
   ...Object.fromEntries(["position", "destroyed_length", "at", "anchor", "point"].map((key) => [key, { unit: "m", factor: 1 }])),
   ...Object.fromEntries(["residual_bars", "residual_concrete", "transition_damage", "cut_bars", "cut_concrete"].map((key) => [key, { unit: "%", factor: 100 }])),
   time: { unit: "s", factor: 1 },
+  delay: { unit: "s", factor: 1 },
   stiffness: { unit: "MN/m", factor: 1e-6 },
   pretension: { unit: "kN", factor: 1e-3 },
   strength: { unit: "kN", factor: 1e-3 },

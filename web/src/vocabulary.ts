@@ -128,5 +128,6 @@ export const groupWord: Record<string, string> = {
   energy: "Energies",
   force: "Ground force",
   height: "Height of the centre of mass",
+  cable: "Pull of cables",
 };
 export const groupOrder = ["angle", "energy", "force"];

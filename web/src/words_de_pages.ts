@@ -197,6 +197,7 @@ export const germanOfPages: readonly (readonly [string, string])[] = [
   ["Ends at", "Endet bei"],
   [", when less than half of the upper block holds together.", ", wenn weniger als die Hälfte des oberen Blocks zusammenhält."],
   ["This browser shows no 3D picture (WebGL is not available).", "Dieser Browser zeigt kein 3D-Bild (WebGL ist nicht verfügbar)."],
+  ["This browser offers no WebGL 2.", "Dieser Browser bietet kein WebGL 2."],
   ["Findings, plots, events and tables on this page are complete. To see the playback, switch on hardware acceleration or open the file in another browser.", "Befunde, Diagramme, Ereignisse und Tabellen dieser Seite sind vollständig. Um den Ablauf zu sehen, die Hardwarebeschleunigung einschalten oder die Datei in einem anderen Browser öffnen."],
   ["This {} cannot be shown", "Diese Seite kann nicht gezeigt werden: {}"],
   ["report", "Bericht"],
@@ -577,6 +578,9 @@ export const germanOfPages: readonly (readonly [string, string])[] = [
   ["First touchdown of the upper block: A {w}, B {w}, difference {w}.", "Erstes Aufsetzen des oberen Blocks: A {}, B {}, Unterschied {}."],
   ["Tilt up to {:.2f} s: largest difference {:.2f} deg at {:.2f} s.", "Neigung bis {} s: größter Unterschied {} deg bei {} s."],
   ["Tilt up to {:.2f} s: largest difference {:.2f} deg at {:.2f} s, {:.0f} % of the larger tilt at the end of this time.", "Neigung bis {} s: größter Unterschied {} deg bei {} s, {} % der größeren Neigung am Ende dieser Zeit."],
-  ["At {:.2f} s all bodies compared lean by {:.2f} deg in A, {:.2f} deg in B.", "Bei {} s neigen sich alle verglichenen Körper in A um {} deg, in B um {} deg."],
+  ["At {:.2f} s all bodies compared lean by {:.2f} deg in A, {:.2f} deg in B: {:.2f} deg apart.", "Bei {} s neigen sich alle verglichenen Körper in A um {} deg, in B um {} deg: {} deg auseinander."],
+  ["They lean towards {w} in A, {w} in B.", "Sie neigen sich in A nach {}, in B nach {}."],
+  ["Leans up to {:.2f} s: at most {:.2f} deg apart.", "Neigungen bis {} s: höchstens {} deg auseinander."],
+  ["Tilt: A counts it towards {w}, B towards {w}, so it is not compared; see how they lean.", "Neigung: A zählt sie nach {}, B nach {}; sie wird nicht verglichen, siehe, wohin sie sich neigen."],
   ["Mass centres up to then: at most {:.2f} m apart.", "Schwerpunkte bis dahin: höchstens {} m auseinander."],
 ];
