@@ -6,6 +6,8 @@
 #include <set>
 #include <tuple>
 
+#include "base/disjoint_sets.h"
+#include "base/error.h"
 #include "collapse/builder.h"
 #include "collapse/frequency_limit.h"
 
@@ -40,6 +42,47 @@ std::string describe(const product::Plan& plan, size_t index) {
   return key;
 }
 
+std::string join(std::vector<std::string>& list) {
+  std::sort(list.begin(), list.end());
+  std::string all;
+  for (const std::string& s : list) {
+    append_bytes(all, static_cast<double>(s.size()));
+    all += s;
+  }
+  return all;
+}
+
+/// What spans from each frame to the next.
+std::vector<std::string> describe_bays(const product::Plan& plan) {
+  std::vector<std::vector<std::string>> spans(plan.frame_names.size());
+  for (size_t i = 0; i < plan.members.size(); ++i) {
+    const Member& m = plan.members[i];
+    if (!m.removed && m.frame_a != m.frame_b)
+      spans[static_cast<size_t>(std::min(m.frame_a, m.frame_b))].push_back(describe(plan, i));
+  }
+  std::vector<std::string> out;
+  for (std::vector<std::string>& s : spans) out.push_back(join(s));
+  return out;
+}
+
+/// Whether members join all columns with each other above the ground.
+bool is_one_structure(const product::Plan& plan) {
+  const auto F = static_cast<int>(plan.frame_names.size());
+  DisjointSets joined(plan.row_names.size() * plan.frame_names.size());
+  std::set<int> used;
+  for (const Member& m : plan.members) {
+    if (m.removed || m.kind == MemberKind::Shaft) continue;
+    const int first = m.row_a * F + m.frame_a;
+    for (const int at : {first, m.row_a * F + m.frame_b, m.row_b * F + m.frame_a, m.row_b * F + m.frame_b}) {
+      joined.join_under_lower(first, at);
+      used.insert(at);
+    }
+  }
+  std::set<int> roots;
+  for (const int at : used) roots.insert(joined.find(at));
+  return roots.size() < 2;
+}
+
 /// What each frame is and carries; mirrored frames have the same text.
 std::vector<std::string> describe_frames(const product::Plan& plan) {
   struct Parts {
@@ -57,15 +100,6 @@ std::vector<std::string> describe_frames(const product::Plan& plan) {
       parts[std::max(a, b)].side[0].push_back(describe(plan, i));
     }
   }
-  const auto join = [](std::vector<std::string>& list) {
-    std::sort(list.begin(), list.end());
-    std::string all;
-    for (const std::string& s : list) {
-      append_bytes(all, static_cast<double>(s.size()));
-      all += s;
-    }
-    return all;
-  };
   std::vector<std::string> out;
   for (Parts& p : parts) {
     std::vector<std::string> sides{join(p.side[0]), join(p.side[1])};
@@ -83,6 +117,7 @@ std::string find_refusal(const product::Plan& plan, const Knowledge& k) {
   constexpr double along = 1e-3;  // [rad]
   if (std::abs(map.fall_direction.y) > along) return "the fall is not along the frames";
   if (!plan.cables.empty()) return "cables pull at single frames";
+  if (!is_one_structure(plan)) return "parts of it stand apart";
   for (size_t i = 0; i < plan.members.size(); ++i) {
     const Member& m = plan.members[i];
     if (m.kind == MemberKind::Shaft && !m.removed) return m.name + " is a shaft";
@@ -356,13 +391,16 @@ mbs::Model build_condensed(Builder& b) {
 
 Condensation find_like_frames(std::span<const product::Plan* const> plans, const Knowledge& k) {
   Condensation out;
-  std::vector<std::string> text;
+  std::vector<std::string> text, bay;
   for (const product::Plan* plan : plans) {
     out.refusal = find_refusal(*plan, k);
     if (!out.refusal.empty()) return out;
     const std::vector<std::string> frames = describe_frames(*plan);
     text.resize(frames.size());
     for (size_t f = 0; f < frames.size(); ++f) text[f] += frames[f];
+    const std::vector<std::string> bays = describe_bays(*plan);
+    bay.resize(bays.size());
+    for (size_t f = 0; f < bays.size(); ++f) bay[f] += bays[f];
   }
   std::map<std::string, int> known;
   for (size_t f = 0; f < text.size(); ++f) {
@@ -371,7 +409,18 @@ Condensation find_like_frames(std::span<const product::Plan* const> plans, const
     out.frames[static_cast<size_t>(at->second)].push_back(static_cast<int>(f));
     out.class_of.push_back(at->second);
   }
-  if (out.frames.size() == text.size()) out = {{}, {}, "no two frames are alike"};
+  if (out.frames.size() == text.size()) return {{}, {}, "no two frames are alike"};
+  // one bay between two classes stands for all of them
+  std::map<std::pair<int, int>, size_t> bays;
+  for (size_t f = 0; f + 1 < text.size(); ++f) {
+    const std::pair<int, int> here = std::minmax(out.class_of[f], out.class_of[f + 1]);
+    const size_t first = bays.emplace(here, f).first->second;
+    if (here.first == here.second || bay[first] == bay[f]) continue;
+    const auto name = [&](size_t i) {
+      return plans.front()->frame_names[i] + " and " + plans.front()->frame_names[i + 1];
+    };
+    return {{}, {}, "bays between like frames differ: between " + name(first) + ", and between " + name(f)};
+  }
   return out;
 }
 
@@ -388,6 +437,17 @@ KnownCurves make_known_curves(const product::Plan& plan, const Knowledge& k, con
 mbs::Model make_condensed_model(const product::Plan& plan, const Knowledge& k, const Condensation& c,
                                 const KnownCurves* known, ModelMap& map) {
   map = {};
+  // values of a sample may tell apart what was alike in those that the classes were found from
+  const std::vector<std::string> frame = describe_frames(plan);
+  for (const std::vector<int>& like : c.frames)
+    for (const int f : like) {
+      const auto first = static_cast<size_t>(like.front()), here = static_cast<size_t>(f);
+      if (frame[here] == frame[first]) continue;
+      throw InputError("E206",
+                       "frames " + plan.frame_names[first] + " and " + plan.frame_names[here] +
+                           " are one in a condensed run and differ with these values",
+                       "run the study without --condensed");
+    }
   Builder builder(plan, k, map, 1, known);
   builder.condensation = &c;
   mbs::Model model = build_condensed(builder);

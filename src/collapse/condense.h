@@ -27,7 +27,7 @@ KnownCurves make_known_curves(const product::Plan&, const Knowledge&, const Cond
 /// The model of one frame of each class, with the mass, stiffness and resistance of all of its class, moving in the
 /// plane of the frames. Numbers as of make_model; what lies between frames of one class is left out but for its mass.
 ///   known  curves that need not be made anew; may be null
-/// Throws InputError as make_model does.
+/// Throws InputError as make_model does, and E206: frames of one class that differ in this plan.
 mbs::Model make_condensed_model(const product::Plan&, const Knowledge&, const Condensation&, const KnownCurves* known,
                                 ModelMap& map);
 

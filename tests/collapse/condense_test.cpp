@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "base/error.h"
 #include "mbs/model_json.h"
 #include "mbs/solver.h"
 #include "plans.h"
@@ -61,6 +62,45 @@ TEST(Condense, WhatIsTakenOutBeforehandMakesNoDifference) {
   shaft.frame_a = shaft.frame_b = -1;
   plan.members.push_back(shaft);
   EXPECT_THAT(find(plan).frames, ElementsAre(ElementsAre(0, 2), ElementsAre(1)));
+}
+
+TEST(Condense, FramesThatASampleTellsApartAreNotOne) {
+  product::Plan plan = read(house(charge("C-A*-0")));
+  const Condensation like = find(plan);
+  ModelMap map;
+  EXPECT_NO_THROW(make_condensed_model(plan, default_knowledge(), like, nullptr, map));
+  for (product::Charge& c : plan.stages[0].charges)
+    if (plan.members[static_cast<size_t>(c.member)].name == "C-A3-0") c.residual_concrete = 0.5;
+  try {
+    make_condensed_model(plan, default_knowledge(), like, nullptr, map);
+    ADD_FAILURE() << "frames 1 and 3 differ";
+  } catch (const InputError& e) { EXPECT_THAT(e.what(), HasSubstr("frames 1 and 3 are one in a condensed run")); }
+}
+
+TEST(Condense, PartsThatStandApartAreNotOneBuilding) {
+  product::Plan plan = read(house(charge("C-A*-0")));
+  EXPECT_EQ(find(plan).refusal, "");
+  for (product::Member& m : plan.members)
+    if (m.frame_a != m.frame_b && std::max(m.frame_a, m.frame_b) == 2) m.removed = true;
+  EXPECT_EQ(find(plan).refusal, "parts of it stand apart");
+}
+
+TEST(Condense, OneBayDoesNotStandForUnlikeOnes) {
+  // frames 2 and 4 are charged and have floors on one side each, towards 1 and 3
+  const std::string frames = "1 = \"0 m\", 2 = \"4 m\", 3 = \"8 m\", 4 = \"12 m\", 5 = \"16 m\"";
+  product::Plan plan = read(materials() + grid("A = \"0 m\", B = \"5 m\"", frames, 2, "1 kN/m2") +
+                            "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n[[slabs]]\n"
+                            "panel = \"floor\"\n" +
+                            charge("C-A2-0") + charge("C-A4-0", "0.1 s") + analysis());
+  for (product::Stage& stage : plan.stages)
+    for (product::Charge& c : stage.charges) c.delay = 0;
+  plan.stages[1].charges.insert(plan.stages[1].charges.end(), plan.stages[0].charges.begin(),
+                                plan.stages[0].charges.end());
+  plan.stages.erase(plan.stages.begin());
+  EXPECT_EQ(find(plan).refusal, "");
+  for (product::Member& m : plan.members)
+    if (m.kind == product::MemberKind::Slab && std::min(m.frame_a, m.frame_b) % 2 == 1) m.removed = true;
+  EXPECT_EQ(find(plan).refusal, "bays between like frames differ: between 2 and 3, and between 3 and 4");
 }
 
 TEST(Condense, SaysWhyItCannot) {
