@@ -1051,6 +1051,35 @@ void add_overloads(const Context& c) {
         members.front().second, "1", Status::Bad);
 }
 
+/// How hard cables pull, by the frames.
+void add_cables(const Context& c) {
+  for (const mbs::Cable& cable : c.model.cables) {
+    const auto& all = c.r.series;
+    const auto pull =
+        std::find_if(all.begin(), all.end(), [&](const auto& s) { return s.id == "cable_" + cable.name; });
+    if (pull == all.end()) continue;
+    double first = kNone, most = 0, when = 0;
+    for (size_t i = 0; i < c.r.time.size(); ++i) {
+      if (!std::isfinite(pull->value[i])) continue;
+      if (std::isnan(first)) first = pull->value[i];
+      if (pull->value[i] > most) most = pull->value[i], when = c.r.time[i];
+    }
+    std::string text = "It is slack in all frames.";
+    if (most > 0) {
+      text = fmt::format("It pulls with {:.4g} kN at first and with {:.4g} kN at most, at {:.2f} s", first / unit::kN,
+                         most / unit::kN, when);
+      if (std::isfinite(cable.strength)) text += fmt::format(": {:.0f} % of its strength", 100 * most / cable.strength);
+      text += ".";
+    }
+    const auto& events = c.r.events;
+    const auto rupture = std::find_if(events.begin(), events.end(),
+                                      [&](const auto& e) { return e.kind == "cable" && e.subject == cable.name; });
+    const bool is_broken = rupture != events.end();
+    if (is_broken) text += fmt::format(" It breaks at {:.2f} s.", rupture->time);
+    c.add("cable." + cable.name, "Cables", cable.name, text, most, "N", is_broken ? Status::Warning : Status::Info);
+  }
+}
+
 bool is_limit(const record::Finding& f) { return f.id.rfind("criterion.", 0) == 0 || f.id.rfind("clearance.", 0) == 0; }
 
 }  // namespace
@@ -1100,38 +1129,6 @@ std::string tell_not_modelled(const std::vector<std::string>& list) {
     if (s != kNoSafeDistance) text += (text.empty() ? "" : "; ") + s;
   return text + ".";
 }
-
-namespace {
-
-/// How hard cables pull, by the frames.
-void add_cables(const Context& c) {
-  for (const mbs::Cable& cable : c.model.cables) {
-    const auto& all = c.r.series;
-    const auto pull =
-        std::find_if(all.begin(), all.end(), [&](const auto& s) { return s.id == "cable_" + cable.name; });
-    if (pull == all.end()) continue;
-    double first = kNone, most = 0, when = 0;
-    for (size_t i = 0; i < c.r.time.size(); ++i) {
-      if (!std::isfinite(pull->value[i])) continue;
-      if (std::isnan(first)) first = pull->value[i];
-      if (pull->value[i] > most) most = pull->value[i], when = c.r.time[i];
-    }
-    std::string text = "It is slack in all frames.";
-    if (most > 0) {
-      text = fmt::format("It pulls with {:.4g} kN at first and with {:.4g} kN at most, at {:.2f} s", first / unit::kN,
-                         most / unit::kN, when);
-      if (std::isfinite(cable.strength)) text += fmt::format(": {:.0f} % of its strength", 100 * most / cable.strength);
-      text += ".";
-    }
-    bool is_broken = false;
-    for (const record::Event& e : c.r.events)
-      if (e.kind == "cable" && e.subject == cable.name && !is_broken)
-        is_broken = true, text += fmt::format(" It breaks at {:.2f} s.", e.time);
-    c.add("cable." + cable.name, "Cables", cable.name, text, most, "N", is_broken ? Status::Warning : Status::Info);
-  }
-}
-
-}  // namespace
 
 bool add_findings(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
                   const Recorder& recorder, const mbs::Summary& summary, record::Record& r,

@@ -320,7 +320,7 @@ class Placing {
   }
   void count(const Way& way, int line) {
     if (!way.block.empty() && ++inserted_ > kMostInserted)
-      fail_dxf(name_, line, fmt::format("blocks make more than {} outlines", kMostInserted),
+      fail_dxf(name_, line, fmt::format("blocks make more than {} outlines and insertions", kMostInserted),
                "leave out what is not near");
   }
 

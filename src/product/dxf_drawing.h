@@ -49,7 +49,7 @@ struct DxfDrawing {
 
 /// What lies in the drawing, with the entities of its blocks wherever they are inserted, each on the layer of its
 /// insertion where it has none of its own ("0"). Throws InputError E113: numbers that are none, a block within itself,
-/// more than 100,000 entities of blocks.
+/// more than 100,000 outlines and insertions of blocks.
 DxfDrawing read_dxf_drawing(const std::vector<DxfPair>&, const std::string& file_name);
 
 /// Throws InputError E113 at a line; 0: of the whole file.

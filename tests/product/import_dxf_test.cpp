@@ -322,14 +322,15 @@ TEST(ImportDxfBlocks, ThatGrowWithoutEndAreRefused) {
             "the block A is inserted into itself");
   const std::string many = "70\n1000\n71\n1000\n";
   EXPECT_EQ(message(with_blocks(block("A", "", outline("0", kHouse)), insertion("A", "0", many))),
-            "blocks make more than 100000 outlines");
+            "blocks make more than 100000 outlines and insertions");
   // each twice the one within it
   std::string blocks = block("B0", "", outline("0", kHouse));
   for (int i = 1; i < 40; ++i) {
     const std::string inner = insertion("B" + std::to_string(i - 1), "0", "");
     blocks += block("B" + std::to_string(i), "", inner + inner);
   }
-  EXPECT_EQ(message(with_blocks(blocks, insertion("B39", "0", ""))), "blocks make more than 100000 outlines");
+  EXPECT_EQ(message(with_blocks(blocks, insertion("B39", "0", ""))),
+            "blocks make more than 100000 outlines and insertions");
 }
 
 }  // namespace
