@@ -245,7 +245,7 @@ void read_cables(Reading& reading, TableReader& root) {
     c.where = reading.complaints.position(nodes[i]->place);
     const auto& others = reading.plan.cables;
     if (std::any_of(others.begin(), others.end(), [&c](const Cable& other) { return other.name == c.name; }))
-      table.error("E207", table.find("name") ? table.place_of("name") : nodes[i]->place,
+      table.error("E208", table.find("name") ? table.place_of("name") : nodes[i]->place,
                   "name: another cable is called " + quoted(c.name), "results tell cables by their names");
     const std::string member = table.text("member");
     c.position = table.quantity("position", Dimension::Length, {0, 1000});

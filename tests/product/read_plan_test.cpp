@@ -197,7 +197,7 @@ const Mistake member_mistakes[] = {
     {"E306", "position = \"1 m\"\nanchor", "position = «\"3.5 m\"»\nanchor", "beyond the end of C-A2-1", "3 m long"},
     {"E207", "anchor = [\"-40 m\", \"5 m\", \"0 m\"]", "anchor = «[\"0 m\", \"4 m\", \"4 m\"]»",
      "anchor: is where the cable is tied to C-A2-1", "no direction"},
-    {"E207", "[[cable]]",
+    {"E208", "[[cable]]",
      "[[cable]]\nname = \"cable 2\"\nmember = \"C-A2-1\"\nposition = \"1 m\"\nanchor = [\"-30 m\", \"5 m\", \"0 m\"]\n"
      "stiffness = \"1 MN/m\"\nstrength = \"90 kN\"\n[[cable]]\nname = «\"cable 2\"»",
      "name: another cable is called \"cable 2\"", "tell cables by their names"},
